@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, clip, where
+from cmg_mj.core.arrays import Scalar, clip, dot, where
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import FeedbackState, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
+from cmg_mj.laws.state_feedback import solved
 from cmg_mj.observers.kalman import COLUMNS, Kalman
 
 MIN_NOISE = 1e-6
@@ -93,29 +93,28 @@ class Lqg:
         F, G, Q, N, R = sampled_cost(
             self.model.A_e, self.model.B_e, np.diag(self.state_cost), np.array([[self.input_cost]]), self.dt
         )
-        K = _solved("state_cost", lambda: control.dlqr(F, G, Q, R, N))
+        K = solved("state_cost", lambda: control.dlqr(F, G, Q, R, N), _is_stable)
         return tuple(np.ravel(K[0]).tolist())  # type: ignore[return-value]
 
     @cached_property
     def transition(self) -> tuple[np.ndarray, np.ndarray]:
         """F (4, 4) and G (4, 1): x1, x2, x3, torque a sample later, with u held."""
-        A = np.zeros((4, 4))
-        A[:3, :3] = self.model.A
-        A[1, 3] = 1.0 / (self.model.gimbals * self.model.J1)
-        F, G, _ = hold_matrices(A, np.vstack([self.model.B, [[0.0]]]), self.dt)
-        return F, G
+        return hold_matrices(self._kalman.A, self.model.B_e, self.dt)[:2]
 
     @property
     def C(self) -> np.ndarray:
         """x1 and x3 are measured, (2, 4)."""
         return np.hstack([self.model.C, np.zeros((2, 1))])
 
+    @cached_property
+    def _kalman(self) -> Kalman:
+        """Has the same model and the same w."""
+        return Kalman(self.dt, self.model, self.noise, self.torque_walk, self.torque_white, self.gimbal_white)
+
     @property
     def process_noise(self) -> np.ndarray:
         """Q, covariance of w, (4, 4)."""
-        walks = {name: getattr(self, name) for name in ("torque_walk", "torque_white", "gimbal_white")}
-        Q = Kalman(self.dt, self.model, self.noise, **walks).process_noise
-        return np.array([[Q[place] for place in column] for column in COLUMNS])
+        return np.array([[self._kalman.process_noise[place] for place in column] for column in COLUMNS])
 
     @property
     def measurement_noise(self) -> np.ndarray:
@@ -128,7 +127,9 @@ class Lqg:
         import control
 
         F, Q, R = self.transition[0], self.process_noise, self.measurement_noise
-        return _solved("the noise", lambda: control.dlqe(F, np.eye(4), self.C, Q, R))[1]
+        return solved(
+            "torque_walk, torque_white, gimbal_white", lambda: control.dlqe(F, np.eye(4), self.C, Q, R), _is_stable
+        )[1]
 
     @cached_property
     def innovation_gain(self) -> np.ndarray:
@@ -161,7 +162,7 @@ class Lqg:
         u = clip(demanded, -self.rate_limit, self.rate_limit)
         winding = (u != demanded) & (k4 * x3 * demanded > 0.0)
         x_e = where(winding, x_e, x_e - self.dt * (x3 + 0.5 * self.dt * u))
-        e1, e2, e3, e4 = [a * x1 + b * x2 + c * x3 + d * torque + g * u for a, b, c, d, g in ahead]
+        e1, e2, e3, e4 = (dot(row, (x1, x2, x3, torque, u)) for row in ahead)
         return LqgState(e1, e2, e3, e4, x_e), u
 
 
@@ -193,16 +194,5 @@ def sampled_cost(
     return moved[:n, :n], moved[:n, n:], cost[:n, :n], cost[:n, n:], cost[n:, n:]
 
 
-def _solved(what: str, solve: Callable[[], tuple[Any, Any, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a gain, the Riccati equation's solution, and the poles.
-
-    Raises:
-        ValueError: There is no stabilising one.
-    """
-    try:
-        gain, P, poles = (np.asarray(part) for part in solve())
-    except Exception as error:
-        raise ValueError(f"{what}: no stabilising gain ({error})") from error
-    if not (np.all(np.isfinite(gain)) and np.all(np.abs(poles) < 1.0)):
-        raise ValueError(f"{what}: no stabilising gain")
-    return gain, P, poles
+def _is_stable(poles: np.ndarray) -> bool:
+    return bool(np.all(np.abs(poles) < 1.0))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -37,15 +37,31 @@ def lqr_gains(model: ReducedModel, state_cost: Sequence[float], input_cost: floa
     """
     import control  # 1.5 s of import, needed only here
 
-    try:
-        K, _, poles = control.lqr(model.A_e, model.B_e, np.diag(state_cost), np.array([[input_cost]]))
-    except Exception as error:
-        raise InputError(f"controller.lqr: no stabilising gain for these weights ({error})") from error
-    if not (np.all(np.isfinite(K)) and is_hurwitz(poles)):
-        raise InputError(
-            "controller.lqr: no stabilising gain for these weights (give x_e a positive weight, or a larger one)"
-        )
+    Q, R = np.diag(state_cost), np.array([[input_cost]])
+    K, _ = solved("controller.lqr", lambda: control.lqr(model.A_e, model.B_e, Q, R), is_hurwitz)
     return tuple(float(k) for k in np.ravel(K))
+
+
+def solved(
+    what: str, solve: Callable[[], tuple[Any, Any, Any]], is_stable: Callable[[np.ndarray], bool]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a gain and the Riccati equation's solution.
+
+    Args:
+        what: The weights, for the message.
+        solve: Returns these and the poles.
+        is_stable: Judges the poles.
+
+    Raises:
+        InputError: There is no stabilising gain.
+    """
+    try:
+        gain, P, poles = (np.asarray(part) for part in solve())
+        if not (np.all(np.isfinite(gain)) and is_stable(poles)):
+            raise ValueError("give x_e a positive weight, and what is tiny a larger one")
+    except Exception as error:
+        raise InputError(f"{what}: no stabilising gain for these weights ({error})") from error
+    return gain, P
 
 
 def scaled_gains(model: ReducedModel) -> tuple[float, float, float, float]:

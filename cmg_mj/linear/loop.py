@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -35,13 +36,11 @@ OUTPUTS = ("x1_rad", "x2_rad_s", "x3_rad", "u_rad_s")
 """Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
-WITH_A_SLOPE = (
-    *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain", "kalman", "linear"),
-    *("linear_high_gain", "ltv", "luenberger"),
+TAKES = (
+    "state_feedback with adaptive, finite_difference, free_pivot, gyro_free, high_gain, kalman, linear, "
+    "linear_high_gain, ltv, luenberger"
 )
-"""Observers of the package that have a slope at rest."""
-
-
+"""The package's law and observers that have a slope at rest."""
 NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
 
 
@@ -85,29 +84,32 @@ def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> cont
     Raises:
         InputError: Something in the loop is not linear, or not covered.
     """
-    settings, dt, cure = design.scenario.plant, design.law.dt, 'take linear_closed_loop(plant="rig")'
+    import control  # 0.9 s of import: no run waits for it
+
+    settings, dt = design.scenario.plant, design.law.dt
     if model not in MODELS:
         raise InputError(f"linear_closed_loop: plant = {shortened(repr(model))}: {nearest(str(model), MODELS)}")
-    if model == "rig":
-        linear = linearise_alone(plant)
-    elif plant.bends:
-        raise InputError(f"bend: the reduced model is rigid; {cure}, or set bend.frequency_hz=0")
-    elif plant.reduced.pivot_arm:
-        raise InputError(f"plant.model = {settings.model!r}: its pivot slides; {cure}")
-    else:
-        linear = linear_reduced(plant.reduced)
+    unmodelled = "bend: the reduced model is rigid" if plant.bends else ""
+    if plant.reduced.pivot_arm:
+        unmodelled = f"plant.model = {settings.model!r}: its pivot slides"
+    if unmodelled and model == "reduced":
+        raise InputError(f'{unmodelled}; take linear_closed_loop(plant="rig")')
+    linear = linearise_alone(plant) if model == "rig" else linear_reduced(plant.reduced)
     if backlash := settings.gimbal_backlash_arcmin:
         raise InputError(
             f"plant.gimbal_backlash_arcmin = {backlash:g}: backlash is not linear; set plant.gimbal_backlash_arcmin=0"
         )
     for name in sensors_used(design):
         rate = getattr(design.scenario.sensors, name).rate_hz
-        if abs(rate * dt - round(rate * dt)) > 1e-9 or round(rate * dt) < 1:
+        if abs(rate * dt - max(round(rate * dt), 1)) > 1e-9:
             raise InputError(
                 f"sensors.{name}.rate_hz = {rate:g}: linear_closed_loop takes the control rate, {1.0 / dt:g} Hz, or a "
                 "whole multiple of it"
             )
-    return ClosedLoop(design, linear).system()
+    loop = ClosedLoop(design, linear)
+    *matrices, states, outputs = loop.matrices()
+    names = {"inputs": loop.inputs, "outputs": outputs, "states": states, "name": "closed_loop"}
+    return control.StateSpace(*matrices, dt, **names, remove_useless_states=False)
 
 
 def sensors_used(design: Design) -> list[str]:
@@ -136,23 +138,16 @@ class ClosedLoop:
     def __init__(self, design: Design, plant: LinearPlant, *, true_state: bool = False) -> None:
         self._design, self._plant, self._true_state = design, plant, true_state
         law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
-        self._estimating, self._extra, kind = NO_SLOPES, (), design.scenario.observer.kind
-        if not true_state:
-            observer = design.observer()
-            self._extra = extra_signals(observer)
-            try:
-                self._estimating = observer_slopes(observer)
-            except InputError as error:
-                raise InputError(
-                    f"observer.kind = {kind!r}: {error}; linear_closed_loop takes {', '.join(WITH_A_SLOPE)}, or one of "
-                    "your own"
-                ) from error
+        self._estimating, extra, field = NO_SLOPES, (), f"controller.kind = {controller.kind!r}"
         try:
-            self._deciding = law_slopes(design.fresh_law(), len(self._extra))
+            if not true_state:
+                observer, field = design.observer(), f"observer.kind = {design.scenario.observer.kind!r}"
+                self._estimating, extra = observer_slopes(observer), extra_signals(observer)
+                field = f"controller.kind = {controller.kind!r}"
+            self._deciding = law_slopes(design.fresh_law(), len(extra))
         except InputError as error:
-            raise InputError(
-                f"controller.kind = {controller.kind!r}: {error}; linear_closed_loop takes state_feedback"
-            ) from error
+            raise InputError(f"{field}: {error}; linear_closed_loop takes {TAKES}, or one of your own") from error
+        self._estimates = [] if true_state else [f"estimated_{name}" for name in (*OUTPUTS[:3], *extra)]
         self._channels = _channels(design, true_state)
         control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
@@ -184,22 +179,8 @@ class ClosedLoop:
         bandwidth = design.scenario.sensors.accelerometer.bandwidth_hz
         self._low_pass = coefficients(bandwidth, INSIDE_HZ) if bandwidth else [[0.0] * 3] * 2
 
-    def system(self) -> control.StateSpace:
-        """Make the system for python-control."""
-        import control  # 0.9 s of import: no run waits for it
-
-        A, B, C, D, kept, outputs = self.matrices()
-        return control.StateSpace(
-            *(A, B, C, D, self.period if self.ticks > 1 else self._design.law.dt),
-            inputs=self.inputs,
-            outputs=outputs,
-            states=[name for name, is_kept in zip(self.states, kept, strict=True) if is_kept],
-            name="closed_loop",
-            remove_useless_states=False,
-        )
-
-    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str]]:
-        """Compute A, B, C, D of the states that reach an output, which states these are, and the outputs' names.
+    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str], list[str]]:
+        """Compute A, B, C, D of the states that reach an output, and the names of these states and of the outputs.
 
         With several ticks in a period their commands and gimbal rates are further signals.
         """
@@ -215,7 +196,7 @@ class ClosedLoop:
         latched: dict[tuple[str, int], np.ndarray] = {}
         shown, commands = [], []
         rate_noises = self.inputs[len(INPUTS) - 1 :]  # one a tick
-        for step, after in zip(sorted(instants), [*sorted(instants)[1:], self._steps], strict=True):
+        for step, after in pairwise([*sorted(instants), self._steps]):
             motion = plant.C @ x + plant.D @ np.array([turned, push])
             ideal = self._ideal(motion)
             for channel in self._channels:
@@ -227,15 +208,13 @@ class ClosedLoop:
             if step in self._tick_steps:
                 readings = {}
                 for channel in self._channels:
-                    periods_later, taken_at = divmod(channel.taken(step), self._steps)
-                    if periods_later == 0:
-                        readings[channel.name] = latched[channel.name, taken_at]
-                    else:  # taken in an earlier period
-                        readings[channel.name] = start[self._late[channel.name, taken_at, -periods_later]]
+                    ago, at = divmod(channel.taken(step), self._steps)  # periods ago, at a step of theirs
+                    reading = channel.name, at
+                    readings[channel.name] = start[self._late[*reading, -ago]] if ago else latched[reading]
                 u, estimate = self._decide(motion, readings)
                 turned = u + rows[rate_noises[len(commands)]]
                 commands.append(u)
-                shown = shown or [*motion[:3], u, *estimate]
+                shown = shown or [*motion[:3], u, *estimate[: len(self._estimates)]]
             F, G = hold(after - step)
             x = F @ x + G @ np.array([turned, push])
         rows |= dict(zip(plant.names, x, strict=True))
@@ -243,22 +222,20 @@ class ClosedLoop:
             rows[reading] = latched[name, step] if age == 1 else start[self._late[name, step, age - 1]]
         n = len(self.states)
         ahead, out = np.array([rows[name] for name in self.states]), np.array([*shown, *commands[1:]])
-        estimates = [] if self._true_state else [f"estimated_{name}" for name in (*OUTPUTS[:3], *self._extra)]
-        outputs = [*OUTPUTS, *estimates, *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
+        outputs = [*OUTPUTS, *self._estimates, *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
         A, B, C, D = ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
         kept = needed_states(A, C)
-        return A[np.ix_(kept, kept)], B[kept], C[:, kept], D, kept, outputs
+        return A[np.ix_(kept, kept)], B[kept], C[:, kept], D, np.array(self.states)[kept].tolist(), outputs
 
     def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
         """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""
         known, settings = self._design.rig, self._design.scenario.plant
         x1, x2, x3, y1, acceleration, gyro = motion
-        radii = {
-            "inner": known.tilt.r_inner + 1e-3 * settings.accelerometer_inner_misplaced_mm,
-            "outer": known.tilt.r_outer + 1e-3 * settings.accelerometer_outer_misplaced_mm,
-        }
-        forces = {name: radius * acceleration - known.gravity * y1 for name, radius in radii.items()}
-        return forces | {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2}
+        ideal = {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2}
+        for name in ("inner", "outer"):
+            misplaced = 1e-3 * getattr(settings, f"accelerometer_{name}_misplaced_mm")
+            ideal[name] = (getattr(known.tilt, f"r_{name}") + misplaced) * acceleration - known.gravity * y1
+        return ideal
 
     def _second_order(self, name: str, coefficients: Sequence[Sequence[float]], value: np.ndarray) -> np.ndarray:
         """Advance a filter of second order, whose states are a name's 1 and 2."""
@@ -268,24 +245,21 @@ class ClosedLoop:
         rows[f"{name}_2"] = b2 * value - a2 * passed
         return passed
 
-    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
         """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
         rows, settings = self._rows, self._design.scenario.controller
         before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
         if self._true_state:
-            y1, acceleration, x3 = readings["tilt"], 0.0 * before, y2
-            measured, estimate = [y1, y2, acceleration, before], np.array([])
-            x1, x2 = y1, readings.get("rate", motion[1])
+            measured = [readings["tilt"], y2, 0.0 * before, before]
+            estimate = [readings["tilt"], readings["rate"], y2]
         else:
             y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
             y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
             measured = [y1, y2, acceleration, before]
             estimate = self._advance("observer", self._estimating, measured)
-            x1, x2, x3 = (y1, estimate[1], y2) if settings.angle_source == "measured" else estimate[:3]
-            if settings.feedback == "truth":
-                x2 = motion[1]
-        if settings.feedback == "fog":
-            x2 = readings["fog"] + rows["fog_noise_rad_s"]
+        x1, x2, x3 = (measured[0], estimate[1], y2) if settings.angle_source == "measured" else estimate[:3]
+        if settings.feedback != "observer":
+            x2 = motion[1] if settings.feedback == "truth" else readings["fog"] + rows["fog_noise_rad_s"]
         (u,) = self._advance("law", self._deciding, [*measured, x1, x2, x3, *estimate[3:]])
         if self._notch is not None:
             u = self._second_order("notch", (self._notch.numerator, self._notch.denominator), u)
@@ -314,8 +288,7 @@ def _channels(design: Design, true_state: bool) -> list[_Channel]:
         if name != "accelerometer":
             channels.append(_Channel(name, *times))
         elif true_state:
-            is_estimated = design.scenario.controller.feedback == "observer"
-            channels += [_Channel(signal, *times) for signal in ("tilt", *(["rate"] if is_estimated else []))]
+            channels += [_Channel(signal, *times) for signal in ("tilt", "rate")]
         else:
             raw = round(1.0 / INSIDE_HZ / timestep) if sensor.bandwidth_hz else 0
             channels.append(_Channel("inner", *times, raw))
@@ -336,5 +309,5 @@ def _measured_slopes(design: Design) -> np.ndarray:
         return np.array([tilt(*forces), tilt.acceleration(forces[0], forces[2])])
 
     h = 1e-5 * gravity
-    inner, outer = measured(h, 0.0) - measured(-h, 0.0), measured(0.0, h) - measured(0.0, -h)
-    return np.array([inner, outer]).T / (2.0 * h)
+    columns = [measured(h, 0.0) - measured(-h, 0.0), measured(0.0, h) - measured(0.0, -h)]
+    return np.transpose(columns) / (2.0 * h)

@@ -122,16 +122,9 @@ def _judge(sizes: np.ndarray, fell: np.ndarray) -> tuple[Motion, bool]:
 
 def _quiet(sensors: Sensors) -> Sensors:
     """Return the sensors with their rates, latencies, ranges and low-passes, and without errors."""
-    pair = sensors.accelerometer
-    pair = Accelerometer(
-        rate_hz=pair.rate_hz,
-        latency_s=pair.latency_s,
-        range_g=pair.range_g,
-        skew_s=pair.skew_s,
-        bandwidth_hz=pair.bandwidth_hz,
-        noise_density_ug_rthz=0.0,
-        counts_per_g=0.0,
-    )
+    kept = ("rate_hz", "latency_s", "range_g", "skew_s", "bandwidth_hz")
+    times = {name: getattr(sensors.accelerometer, name) for name in kept}
+    pair = Accelerometer(**times, noise_density_ug_rthz=0.0, counts_per_g=0.0)
     encoder = replace(sensors.encoder, counts_per_revolution=0.0)
     fog = replace(sensors.fog, angle_random_walk_deg_rth=0.0, bias_deg_h=0.0)
     return replace(sensors, accelerometer=pair, encoder=encoder, fog=fog)

@@ -68,7 +68,7 @@ def observer_slopes(observer: Observer) -> Slopes:
     )
 
 
-def law_slopes(law: Law, extra_signals: int = 0) -> Slopes:
+def law_slopes(law: Law, extra_signals: int) -> Slopes:
     """Find the slopes of a law. Inputs: y1, y2, acceleration, u before, x1, x2, x3, extra signals. Output: u.
 
     Args:
@@ -114,9 +114,9 @@ def _slopes(part: Observer | Law, step: Step, inputs: int) -> Slopes:
             rest = _rest(part.init(Measurement(0.0, 0.0, 0.0)), step, inputs)
             names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
             sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
-        except (InputError, KeyboardInterrupt):
+        except InputError:
             raise
-        except BaseException as error:  # whatever a user's code raises
+        except Exception as error:  # whatever a user's code raises
             raise InputError(f"fails near rest: {raised(error)}") from error
     n = len(names)
     (up, down), _ = sides[0]
@@ -159,9 +159,8 @@ def _one_sided(rest: Any, step: Step, inputs: int, share: float) -> tuple[np.nda
         return np.array([*(leaf.value for leaf in _floats(state)), *(float(output) for output in outputs)])
 
     middle, lengths = after(at), np.where(np.abs(at) > 1e-100, share * np.abs(at), share)
-    up = [(after(at + move) - middle) / length for move, length in zip(np.diag(lengths), lengths, strict=True)]
-    down = [(middle - after(at - move)) / length for move, length in zip(np.diag(lengths), lengths, strict=True)]
-    return np.transpose(up), np.transpose(down)
+    up, down = ([after(at + move) - middle for move in np.diag(length)] for length in (lengths, -lengths))
+    return np.transpose(up) / lengths, np.transpose(down) / -lengths
 
 
 def _floats(state: Any) -> list[Leaf]:

@@ -136,13 +136,9 @@ def margins(transfer: np.ndarray, omega: np.ndarray) -> Margins:
     import control
 
     gains, phases, _, _, crossings, _ = control.stability_margins(control.frd(transfer, omega), returnall=True)
-    least = int(np.argmin(np.abs(phases))) if len(phases) else -1
-    return Margins(
-        min((float(gain) for gain in gains if gain > 1.0), default=np.inf),
-        max((float(gain) for gain in gains if 0.0 < gain < 1.0), default=0.0),
-        abs(float(phases[least])) if len(phases) else np.inf,
-        float(crossings[least]) / (2.0 * np.pi) if len(phases) else np.nan,
-    )
+    phase, at = min(zip(np.abs(phases), crossings, strict=True), default=(np.inf, np.nan))
+    largest = min((gain for gain in gains if gain > 1.0), default=np.inf)
+    return Margins(largest, max((gain for gain in gains if 0.0 < gain < 1.0), default=0.0), phase, at / (2.0 * np.pi))
 
 
 class GainsVerdict(NamedTuple):
@@ -150,38 +146,11 @@ class GainsVerdict(NamedTuple):
 
     Attributes:
         loop: The verdict.
-        period: Of the slowest of the control and the sensors that it uses [s].
-        delay: The longest latency of these sensors [s].
-        suited: Whether the gains would do without sampling, delay and notch.
-        notch_hz: The middle of the notch in the loop; 0 without one [Hz].
+        hint: The fault of the gains, if they have one.
     """
 
     loop: Verdict
-    period: float
-    delay: float
-    suited: bool
-    notch_hz: float
-
-    @property
-    def hint(self) -> str | None:
-        """The fault of the gains, if they have one."""
-        remedy = 'controller.gains = "scaled" or [controller.lqr] finds gains that suit'
-        if self.suited:
-            other = f", or a notch above {self.notch_hz:g} Hz" if self.notch_hz else ""
-            remedy = f"a higher rate or less latency{other} is needed"
-        late = f", {self.delay:g} s late" if self.delay else ""
-        where = f"on this rig's reduced model, sampled every {self.period:g} s{late}"
-        if self.loop.slowest >= MARGIN:
-            fault, figure = "is unstable", f"pole at {self.loop.slowest:.3g} 1/s"
-        elif self.loop.damping < POOR_DAMPING:
-            fault = "is poorly damped"
-            figure = f"damping ratio {self.loop.damping:.2f}, good is {POOR_DAMPING:g} or more"
-        elif self.loop.distance < POOR_DISTANCE:
-            fault = "has little margin"
-            figure = f"its transfer comes within {self.loop.distance:.2f} of -1, good is {POOR_DISTANCE:g} or more"
-        else:
-            return None
-        return f"controller: the closed loop {fault} {where} ({figure}); {remedy}"
+    hint: str | None
 
 
 def judge_gains(design: Design) -> GainsVerdict:
@@ -194,6 +163,7 @@ def judge_gains(design: Design) -> GainsVerdict:
         InputError: In one sample a tilt grows beyond all numbers.
     """
     scenario, law, model = design.scenario, design.law, design.rig.reduced
+    controller = scenario.controller
     assert isinstance(law, StateFeedback)
     used = [getattr(scenario.sensors, name) for name in sensors_used(design)]
     period = max(law.dt, *(1.0 / sensor.rate_hz for sensor in used))
@@ -211,8 +181,21 @@ def judge_gains(design: Design) -> GainsVerdict:
     up = 1j * np.geomspace(1e-3, 1e4, FREQUENCIES)
     states = np.linalg.solve(up[:, None, None] * np.eye(4) - model.A_e, np.broadcast_to(model.B_e, (len(up), 4, 1)))
     ideal = np.min(np.abs(1.0 + np.array(law.gains) @ states[:, :, 0].T))
-    suited = bool(ideal >= POOR_DISTANCE) and is_hurwitz(closed_loop_poles(model, law.gains))
-    return GainsVerdict(loop, period, delay, suited, scenario.controller.notch_hz)
+    remedy, notch_hz = 'controller.gains = "scaled" or [controller.lqr] finds gains that suit', controller.notch_hz
+    if ideal >= POOR_DISTANCE and is_hurwitz(closed_loop_poles(model, law.gains)):  # without sampling, delay and notch
+        other = f", or a notch above {notch_hz:g} Hz" if notch_hz else ""
+        remedy = f"a higher rate or less latency{other} is needed"
+    if loop.slowest >= MARGIN:
+        fault, figure = "is unstable", f"pole at {loop.slowest:.3g} 1/s"
+    elif loop.damping < POOR_DAMPING:
+        fault, figure = "is poorly damped", f"damping ratio {loop.damping:.2f}, good is {POOR_DAMPING:g} or more"
+    elif loop.distance < POOR_DISTANCE:
+        fault = "has little margin"
+        figure = f"its transfer comes within {loop.distance:.2f} of -1, good is {POOR_DISTANCE:g} or more"
+    else:
+        return GainsVerdict(loop, None)
+    where = f"on this rig's reduced model, sampled every {period:g} s" + (f", {delay:g} s late" if delay else "")
+    return GainsVerdict(loop, f"controller: the closed loop {fault} {where} ({figure}); {remedy}")
 
 
 def hints(design: Design, plant: Plant) -> list[str]:
@@ -263,19 +246,16 @@ def sliding_poles(law: object, plant: Plant) -> SlidingPoles | None:
     arm = plant.reduced.pivot_arm
     if not arm or not isinstance(law, StateFeedback):
         return None
-    return SlidingPoles(*(_sliding_pole(law, plant, height) for height in (arm, 0.0)))
-
-
-def _sliding_pole(law: StateFeedback, plant: Plant, height: float) -> float:
-    linear = linearise(plant, rigid=True, height=height)
-    _, rate, y2, y1, _, _ = linear.C
-    k1, k2, k3, k4 = law.gains
-    F, G = linear.hold(law.dt)
-    n = len(F)
-    closed = np.eye(n + 1)
-    closed[:n, :n], closed[:n, n] = F - np.outer(G[:, 0], k1 * y1 + k2 * rate + k3 * y2), -k4 * G[:, 0]
-    closed[n, :n] = -law.dt * y2
-    return _slowest(closed, law.dt, STANDS_STILL)
+    poles, (k1, k2, k3, k4) = [], law.gains
+    for height in (arm, 0.0):
+        linear = linearise(plant, rigid=True, height=height)
+        _, rate, y2, y1, _, _ = linear.C
+        F, G = linear.hold(law.dt)
+        closed = np.eye(len(F) + 1)
+        closed[:-1, :-1], closed[:-1, -1] = F - np.outer(G[:, 0], k1 * y1 + k2 * rate + k3 * y2), -k4 * G[:, 0]
+        closed[-1, :-1] = -law.dt * y2
+        poles.append(_slowest(closed, law.dt))
+    return SlidingPoles(*poles)
 
 
 def sliding_words(plant: Plant) -> str:
@@ -333,22 +313,19 @@ def omissions(scenario: Scenario) -> dict[str, str]:
     Returns:
         Field -> what it is, in words.
     """
-    clauses = {
-        name: clause
-        for name, parts in scenario.feature_sections.items()
-        for part in parts
-        if (clause := part.unmodelled)
-    }
-    accelerometer = scenario.sensors.accelerometer
-    if accelerometer.vibration_mg:
-        clauses["sensors.accelerometer.vibration_mg"] = "the accelerometers' vibration"
-    if any(accelerometer.wheel_harmonics_mg):
-        clauses["sensors.accelerometer.wheel_harmonics_mg"] = "the flywheels' tones in the accelerometers"
-    for which in ("inner", "outer"):
-        field = f"accelerometer_{which}_misplaced_mm"
-        if getattr(scenario.plant, field):
-            clauses[f"plant.{field}"] = f"the {which} accelerometer's misplacement"
-    return clauses
+    accelerometer, plant = scenario.sensors.accelerometer, scenario.plant
+    inner, outer = plant.accelerometer_inner_misplaced_mm, plant.accelerometer_outer_misplaced_mm
+    clauses = [(name, part.unmodelled) for name, parts in scenario.feature_sections.items() for part in parts]
+    clauses += [
+        ("sensors.accelerometer.vibration_mg", accelerometer.vibration_mg and "the accelerometers' vibration"),
+        (
+            "sensors.accelerometer.wheel_harmonics_mg",
+            any(accelerometer.wheel_harmonics_mg) and "the flywheels' tones in the accelerometers",
+        ),
+        ("plant.accelerometer_inner_misplaced_mm", inner and "the inner accelerometer's misplacement"),
+        ("plant.accelerometer_outer_misplaced_mm", outer and "the outer accelerometer's misplacement"),
+    ]
+    return {field: clause for field, clause in clauses if clause}
 
 
 def require_stable_period(law: Law, model: ReducedModel) -> None:
@@ -383,10 +360,10 @@ def require_stable_period(law: Law, model: ReducedModel) -> None:
 def _sampled_pole(law: StateFeedback, model: ReducedModel, period: float) -> float:
     """Return the slowest pole of the loop sampled so often [1/s]."""
     A, B = hold_matrices(model.A_e, model.B_e, period)[:2]
-    return _slowest(A - B @ np.array([law.gains]), period, 0.0)
+    return _slowest(A - B @ np.array([law.gains]), period)
 
 
-def _slowest(closed: np.ndarray, period: float, still: float) -> float:
+def _slowest(closed: np.ndarray, period: float) -> float:
     """Return a sampled loop's slowest pole as of a continuous one, but for those so near 1 [1/s].
 
     It is infinite where a sample's growth is beyond all numbers.
@@ -394,5 +371,5 @@ def _slowest(closed: np.ndarray, period: float, still: float) -> float:
     if not np.all(np.isfinite(closed)):
         return math.inf
     z = np.linalg.eigvals(closed)
-    size = np.abs(z[np.abs(z - 1.0) >= still]).max()
-    return math.log(max(float(size), np.finfo(float).tiny)) / period
+    size = np.max(np.abs(z[np.abs(z - 1.0) >= STANDS_STILL]), initial=np.finfo(float).tiny)
+    return math.log(size) / period

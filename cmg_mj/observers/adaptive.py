@@ -126,30 +126,24 @@ class Adaptive:
         return self.Sigma * (constant / l2**2 + swinging)
 
     @cached_property
-    def _unknowns(self) -> list[tuple[str, list[float]]]:
+    def _unknowns(self) -> dict[str, list[float]]:
         """Name of each unknown, and its weights in Gamma: one for a constant, two for a sinusoid."""
         bias, torque, sinusoid = self.Gamma
-        known = (
-            (self.bias, BIAS, [bias]),
-            (self.torque, TORQUE, [torque]),
-            (self.sinusoid_hz, SINUSOID, [sinusoid, sinusoid]),
-        )
-        return [(name, weights) for wanted, name, weights in known if wanted]
+        return {
+            **({BIAS: [bias]} if self.bias else {}),
+            **({TORQUE: [torque]} if self.torque else {}),
+            **({SINUSOID: [sinusoid, sinusoid]} if self.sinusoid_hz else {}),
+        }
 
-    @cached_property
+    @property
     def extra_signals(self) -> tuple[str, ...]:
         """Names of what is estimated beyond x."""
-        return tuple(name for name, _ in self._unknowns)
+        return tuple(self._unknowns)
 
     @cached_property
     def _minus_Sigma_Gamma(self) -> list[float]:
         """-Sigma Gamma, its diagonal, an entry a state of the exosystem."""
-        return [-self.Sigma * weight for _, weights in self._unknowns for weight in weights]
-
-    @cached_property
-    def _shown(self) -> list[int]:
-        """Indices of the exosystem's states that are extra signals: a constant, and the second part of a sinusoid."""
-        return [-1 if name == SINUSOID else 0 for name in self.extra_signals]
+        return [-self.Sigma * weight for weights in self._unknowns.values() for weight in weights]
 
     @cached_property
     def _estimate(self) -> Any:
@@ -192,7 +186,8 @@ class Adaptive:
         change = [h * lm * nu for lm in Lm]
         x1, x2 = reduce(add, map(mul, T1, change), x1), reduce(add, map(mul, T2, change), x2)
         xm = tuple(map(add, xm, change))
-        signals = [xm[i] for i in self._shown]
+        # A constant, and the second part of a sinusoid.
+        signals = [xm[-1 if name == SINUSOID else 0] for name in self._unknowns]
         return State(x1, x2, xm, T1, T2, y), self._estimate(x1, x2, y2, *signals)
 
     def _acting(self, tilt: Scalar, inertia: Scalar) -> list[Scalar]:

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
-from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import MeasurementNoise
-from cmg_mj.core.types import Estimate, Measurement
+from cmg_mj.core.types import Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
+from cmg_mj.observers.gyro_free import GyroFree, decorrelated
+from cmg_mj.observers.kalman import explained
 
 Scalars: TypeAlias = tuple[Scalar, ...]
 
@@ -54,7 +54,7 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True, config=STRICT)
-class FreePivot:
+class FreePivot(GyroFree):
     """`gyro_free` for a pivot that moves: it learns how strongly, and trusts the measured tilt less.
 
     x1' = x2, x2' = alpha; the sensors show y1 = x1 + w + v and a = alpha + b + n, at the samples.
@@ -103,15 +103,7 @@ class FreePivot:
         inflation: Factor on the covariance of p and z for a rise of S by the variance of y1, over `share`.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("acceleration",)
-
-    dt: Positive
-    model: ReducedModel
-    noise: MeasurementNoise
-    rate_start: Positive = 0.02
     bias_start: Positive = 0.5
-    bias_walk: NonNegative = 0.01
-    jerk: NonNegative = 0.1
     pivot_hz: Positive = 5.0
     pivot_start: NonNegative = 2e-3
     pivot_floor: NonNegative = 1e-3
@@ -124,8 +116,7 @@ class FreePivot:
     inflation: NonNegative = 10.0
 
     def __post_init__(self) -> None:
-        if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
-            raise ValueError("bias_walk = 0 and jerk = 0: with sensors without noise one of them must be positive")
+        GyroFree.__post_init__(self)
         if not (self.noise.tilt or self.pivot_floor):
             raise ValueError("pivot_floor = 0: with sensors without noise it must be positive")
 
@@ -142,17 +133,12 @@ class FreePivot:
         learnt = (1.0 + zero, ww, self._shares[1] + zero, y.y1, zero)
         return self._sample(State(p, zero, zero, zero, *known, *learnt), y)[0]
 
-    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
-        """Advance by one sample period."""
-        state, x1, x2 = self._sample(state, y)
-        return state, Estimate(x1, x2, y.y2)
-
     def _sample(self, state: State, y: Measurement) -> tuple[State, Scalar, Scalar]:
         """Correct what was expected of a sample by what it shows, and advance to the next; x1 and x2 between both."""
         # Learn the noise that there is.
         step = y.y1 - state.y1
         bend = step - state.step
-        scale = state.scale + self._shares[2] * (self._noise[3] * bend * bend - state.scale)
+        scale = state.scale + self._shares[2] * (self._per_bend * bend * bend - state.scale)
 
         e, ee, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
         alpha, p, z, _, w = means
@@ -178,23 +164,23 @@ class FreePivot:
             alpha's error: its rows.
         """
         h, d = self.dt, 1.0 / 6.0
-        c, nn, rest, _ = self._noise
-        p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, *_ = state
+        c, nn, rest = self._noise
+        p, z, b, w, pp, pz, pb, pw, _, zb, zw, bb, bw, ww, *_ = state
 
         a = h * h * y.acceleration
         e = y.y1 - p - w - d * (a - b)
-        ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
+        ep, ez, eb, ew = column = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
         en = r * ((c - d) * nn)
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
-        kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
+        kp, kz, kb, kw = gains = ep / ee, ez / ee, eb / ee, ew / ee
+        kn = en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
 
-        pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
-        pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
-        pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
+        P = explained(state[4:14], gains, column)
+        _, _, pb, _, _, zb, _, bb, bw, _ = P
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
         mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
-        return e, ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
+        return e, ee, (a - b - n, p, z, b, w), (*P, pm, zm, bm, wm, mm)
 
     def _advance(self, means: Scalars, covariance: Scalars, early: Scalar, learnt: Scalars) -> State:
         """Doubt early samples, and advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white."""
@@ -243,13 +229,11 @@ class FreePivot:
         return min(dt / self.pivot_s, 1.0), min(dt / self.learn_s, 1.0), min(dt / self.noise_s, 1.0)
 
     @cached_property
-    def _noise(self) -> tuple[float, float, float, float]:
-        """C and the variances of n dt^2 and of v', v = c n dt^2 + v', v' independent of n; one over 6 times v's."""
-        noise = self.noise
-        n = noise.acceleration * self.dt * self.dt
-        return (
-            noise.correlation * noise.tilt / n if n else 0.0,
-            n**2,
-            noise.tilt**2 * (1.0 - noise.correlation**2),
-            1.0 / (6.0 * noise.tilt**2) if noise.tilt else 0.0,
-        )
+    def _noise(self) -> tuple[float, float, float]:
+        """See `decorrelated`, of n dt^2."""
+        return decorrelated(self.noise, self.noise.acceleration * self.dt * self.dt)
+
+    @cached_property
+    def _per_bend(self) -> float:
+        """One over 6 times the variance of v."""
+        return 1.0 / (6.0 * self.noise.tilt**2) if self.noise.tilt else 0.0

@@ -8,7 +8,7 @@ unit", Sensors 12(5), 2012, doi:10.3390/s120505310, for one axis and two acceler
 from __future__ import annotations
 
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic.dataclasses import dataclass
 
@@ -17,6 +17,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
+from cmg_mj.observers.kalman import explained
 
 
 class State(NamedTuple):
@@ -75,19 +76,19 @@ class GyroFree:
         if not (self.noise.tilt or self.noise.acceleration or self.bias_walk or self.jerk):
             raise ValueError("bias_walk = 0 and jerk = 0: with sensors without noise one of them must be positive")
 
-    def init(self, y: Measurement) -> State:
+    def init(self, y: Measurement) -> Any:
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
         zero = 0.0 * y.y1
         p = y.y1 - self.dt * self.dt / 6.0 * y.acceleration  # so that the first sample shows what is expected
         known = (1.0 + zero, zero, zero, self.rate_start**2 + zero, zero, self.bias_start**2 + zero)
         return self._sample(State(p, zero, zero, *known), y)[0]
 
-    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
+    def step(self, state: Any, y: Measurement, u: Scalar) -> tuple[Any, Estimate]:
         """Advance by one sample period."""
         state, x1, x2 = self._sample(state, y)
         return state, Estimate(x1, x2, y.y2)
 
-    def _sample(self, state: State, y: Measurement) -> tuple[State, Scalar, Scalar]:
+    def _sample(self, state: Any, y: Measurement) -> tuple[Any, Scalar, Scalar]:
         """Correct what was expected of a sample by what it shows, and advance to the next; x1 and x2 between both."""
         h, d = self.dt, self.dt * self.dt / 6.0
         p, z, b, pp, pz, pb, zz, zb, bb = state
@@ -103,8 +104,7 @@ class GyroFree:
         x1, x2 = p + d * alpha, z + 0.5 * h * alpha
 
         # What remains uncertain: of p, z, b, and of m = b + n, which is alpha's error.
-        pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
-        pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
+        pp, pz, pb, zz, zb, bb = explained(state[3:], (kp, kz, kb), (ep, ez, eb))
         pm, zm, bm = pb - kp * en, zb - kz * en, bb - kb * en
         mm = bm - kn * eb + nn - kn * en + self.jerk**2
 
@@ -125,10 +125,16 @@ class GyroFree:
 
     @cached_property
     def _noise(self) -> tuple[float, float, float]:
-        """C and the variance of n and of v', where v = c n + v' and v' is independent of n."""
-        noise = self.noise
-        return (
-            noise.correlation * noise.tilt / noise.acceleration if noise.acceleration else 0.0,
-            noise.acceleration**2,
-            noise.tilt**2 * (1.0 - noise.correlation**2),
-        )
+        """See `decorrelated`."""
+        return decorrelated(self.noise, self.noise.acceleration)
+
+
+def decorrelated(noise: MeasurementNoise, n: float) -> tuple[float, float, float]:
+    """Return c and the variance of n and of v', where v = c n + v' and v' is independent of n.
+
+    Args:
+        noise: Of tilt and angular acceleration.
+        n: Standard deviation of the acceleration, in the observer's unit.
+    """
+    c = noise.correlation * noise.tilt / n if n else 0.0
+    return c, n**2, noise.tilt**2 * (1.0 - noise.correlation**2)

@@ -126,7 +126,8 @@ class HighGain:
         x1, x2, L, before, terms = state
         begin, middle, end, after = stages(self.model, before, terms, y, u)
         Omega, half = abs(u * terms[2]), 0.5 * self.dt
-        L_middle = updated_gain(L, Omega, half, self.phi1, self.phi2, self.phi3)
-        L_end = updated_gain(L_middle, Omega, half, self.phi1, self.phi2, self.phi3)
+        phi = self.phi1, self.phi2, self.phi3
+        L_middle = updated_gain(L, Omega, half, *phi)
+        L_end = updated_gain(L_middle, Omega, half, *phi)
         x1, x2 = follow(self.correction, x1, x2, self.dt, begin, middle, end, (L, L_middle, L_end))
         return State(x1, x2, L_end, y, after), Estimate(x1, x2, y[1])

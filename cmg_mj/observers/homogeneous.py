@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -106,15 +106,6 @@ class BothStates(NamedTuple):
     homogeneous: CopyState
 
 
-class BiasedEstimate(NamedTuple):
-    """The estimate and the bias it was made with."""
-
-    x1: Scalar
-    x2: Scalar
-    x3: Scalar
-    bias_rad: Scalar
-
-
 @dataclass(frozen=True, config=STRICT)
 class HomogeneousAdaptive:
     """The homogeneous differentiator, which takes the equilibrium bias from the adaptive observer.
@@ -162,9 +153,8 @@ class HomogeneousAdaptive:
         """Start both at rest at the measured tilt, the bias unknown."""
         return BothStates(self._adaptive.init(y), self._homogeneous.init(y))
 
-    def step(self, state: BothStates, y: Measurement, u: Scalar) -> tuple[BothStates, BiasedEstimate]:
+    def step(self, state: BothStates, y: Measurement, u: Scalar) -> tuple[BothStates, Any]:
         """Advance by one sample period: first the bias, then (11) with it."""
-        adaptive, adaptive_estimate = self._adaptive.step(state.adaptive, y, u)
-        bias = adaptive_estimate[3]
-        homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, bias)
-        return BothStates(adaptive, homogeneous), BiasedEstimate(*estimate, bias)
+        adaptive, biased = self._adaptive.step(state.adaptive, y, u)
+        homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, biased.bias_rad)
+        return BothStates(adaptive, homogeneous), type(biased)(*estimate, biased.bias_rad)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
+from itertools import combinations_with_replacement
+from operator import add
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.arrays import Scalar, dot
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import TORQUE, Measurement
@@ -19,7 +22,7 @@ TERMS = 6
 """Number of terms of the transition's series. The rest of phi, psi and chi is below 4e-12 of each while the rig's pole
 times the sample period is below 1/20. On the bundled rig that product is 0.037, and the rest is below 6e-13."""
 
-PAIRS = tuple((i, j) for i in range(4) for j in range(i, 4))
+PAIRS = tuple(combinations_with_replacement(range(4), 2))
 """Rows and columns of the stored entries of a symmetric 4x4 matrix: 11, 12, 13, 14, 22, 23, 24, 33, 34, 44."""
 COLUMNS = tuple(tuple(PAIRS.index((min(i, j), max(i, j))) for j in range(4)) for i in range(4))
 """Indices in `PAIRS` of the entries of each column."""
@@ -115,15 +118,21 @@ class Kalman:
         """Variances of v1 and v2 [rad^2]."""
         return self.noise.tilt**2, self.noise.gimbal**2
 
+    @property
+    def A(self) -> np.ndarray:
+        """State matrix of the linearisation (6) with the torque, (4, 4)."""
+        A = np.zeros((4, 4))
+        A[:3, :3] = self.model.A
+        A[1, 3] = 1.0 / (self.model.gimbals * self.model.J1)
+        return A
+
     @cached_property
     def process_noise(self) -> Covariance:
         """Covariance added by a sample period, exact for the linearisation (6)."""
         from scipy.linalg import expm
 
-        per_torque = 1.0 / (self.model.gimbals * self.model.J1)
-        A = np.zeros((4, 4))
-        A[:3, :3] = self.model.A
-        A[1, 3] = per_torque
+        A = self.A
+        per_torque = A[1, 3]
         into = np.array([[0.0, 0.0, 0.0], [0.0, per_torque, self.model.B[1, 0]], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
         into = into * [self.torque_walk, self.torque_white, self.gimbal_white]
         # Van Loan: exp [[-A, N N'], [0, A']] dt = [[., F^-1 Q], [0, F']].
@@ -154,38 +163,18 @@ class Kalman:
     def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
         """Return the state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
-        p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
         f2, a, b, c, d = self.model.slopes(x1, x2, x3, u, torque)
         h, phi, psi, chi = self._integrals(a, b)
 
         jerk = a * x2 + c * u  # f2' but for b f2, which phi has
         x1, x2, x3 = x1 + h * x2 + psi * f2 + chi * jerk, x2 + phi * f2 + psi * jerk, x3 + h * u
 
-        f11, f12, f13, f14 = 1.0 + a * psi, phi, c * psi, d * psi
-        f21, f22, f23, f24 = a * phi, 1.0 + b * phi + a * psi, c * phi, d * phi
-        # F P, its first two rows; the last two of F are those of the identity.
-        m11 = f11 * p11 + f12 * p12 + f13 * p13 + f14 * p14
-        m12 = f11 * p12 + f12 * p22 + f13 * p23 + f14 * p24
-        m13 = f11 * p13 + f12 * p23 + f13 * p33 + f14 * p34
-        m14 = f11 * p14 + f12 * p24 + f13 * p34 + f14 * p44
-        m21 = f21 * p11 + f22 * p12 + f23 * p13 + f24 * p14
-        m22 = f21 * p12 + f22 * p22 + f23 * p23 + f24 * p24
-        m23 = f21 * p13 + f22 * p23 + f23 * p33 + f24 * p34
-        m24 = f21 * p14 + f22 * p24 + f23 * p34 + f24 * p44
-        q = self.process_noise
-        ahead = Covariance(
-            p11=m11 * f11 + m12 * f12 + m13 * f13 + m14 * f14 + q.p11,
-            p12=m11 * f21 + m12 * f22 + m13 * f23 + m14 * f24 + q.p12,
-            p13=m13 + q.p13,
-            p14=m14 + q.p14,
-            p22=m21 * f21 + m22 * f22 + m23 * f23 + m24 * f24 + q.p22,
-            p23=m23 + q.p23,
-            p24=m24 + q.p24,
-            p33=p33 + q.p33,
-            p34=p34 + q.p34,
-            p44=p44 + q.p44,
-        )
-        return (x1, x2, x3, torque), ahead
+        # The first two rows of F, and of M = F P; the last two of F are those of the identity.
+        F1 = 1.0 + a * psi, phi, c * psi, d * psi
+        F2 = a * phi, 1.0 + b * phi + a * psi, c * phi, d * phi
+        M1, M2 = ([dot(row, [P[place] for place in column]) for column in COLUMNS] for row in (F1, F2))
+        moved = dot(M1, F1), dot(M1, F2), *M1[2:], dot(M2, F2), *M2[2:], *P[7:]
+        return (x1, x2, x3, torque), Covariance(*map(add, moved, self.process_noise))
 
     def _integrals(self, a: Scalar, b: Scalar) -> tuple[float, Scalar, Scalar, Scalar]:
         """dt, phi, psi and chi after it: phi is the sum of k_n dt^n/n! with k_(n+1) = b k_n + a k_(n-1)."""
@@ -201,7 +190,19 @@ class Kalman:
 def _corrected(x: Four, P: Covariance, part: int, measured: Scalar, variance: float) -> tuple[Four, Covariance]:
     """Bring in one measured part of the state, whose noise has this variance."""
     column = [P[place] for place in COLUMNS[part]]
-    gain = [entry / (column[part] + variance) for entry in column]
+    gains = [entry / (column[part] + variance) for entry in column]
     off = measured - x[part]
-    x1, x2, x3, torque = (value + k * off for value, k in zip(x, gain, strict=True))
-    return (x1, x2, x3, torque), Covariance(*(p - gain[i] * column[j] for p, (i, j) in zip(P, PAIRS, strict=True)))
+    x1, x2, x3, torque = (value + k * off for value, k in zip(x, gains, strict=True))
+    return (x1, x2, x3, torque), Covariance(*explained(P, gains, column))
+
+
+def explained(P: Sequence[Scalar], gains: Sequence[Scalar], column: Sequence[Scalar]) -> list[Scalar]:
+    """Return P - K c^T, one half of each: the covariance after a sample.
+
+    Args:
+        P: The covariance before, an entry a pair of states.
+        gains: K, on what was not expected of the sample.
+        column: c, covariances of the states with it.
+    """
+    pairs = combinations_with_replacement(range(len(gains)), 2)
+    return [entry - gains[i] * column[j] for entry, (i, j) in zip(P, pairs, strict=True)]

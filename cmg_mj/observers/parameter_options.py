@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS
+from cmg_mj.observers import OBSERVER_CLASSES
 
 ParameterValue: TypeAlias = "bool | int | float | str | Sequence[ParameterValue] | None"
 """Value of an observer's parameter."""
@@ -59,8 +59,6 @@ def parameters_of(settings: Sequence[str]) -> dict[str, dict[str, ParameterValue
         kind, dot, name = place.strip().rpartition(".")
         if not (equals and dot and kind and name):
             raise InputError(f"--set {setting!r}: write OBSERVER.PARAMETER=VALUE, for example homogeneous.k1=20")
-        if ":" not in kind and kind not in OBSERVERS:
-            raise InputError(f"--set {setting!r}: no such observer; {nearest(kind, OBSERVERS)}")
         OBSERVER_CLASSES.find(kind)
         try:
             (value,) = tomllib.loads(f"value = {text}").values()

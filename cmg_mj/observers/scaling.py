@@ -145,8 +145,8 @@ def scale_value(value: Number, unit: Units, scales: Scales) -> Number:
 
 def scaled_names(kind: str) -> tuple[str, ...]:
     """Return the parameters of an observer that go with the rig; none of a user's own observer."""
-    units = UNITS.get(kind, {}).items()
-    return tuple(name for name, its in units if any(unit.of_rig and unit != PURE for unit in _flat(its)))
+    units = UNITS.get(kind, {}).items()  # those in tuples are all of the rig
+    return tuple(name for name, its in units if isinstance(its, tuple) or (its.of_rig and its != PURE))
 
 
 def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:
@@ -161,9 +161,3 @@ def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:
     """
     scales, defaults = scales_of(model), OBSERVER_CLASSES.takes(kind)
     return {name: scale_value(defaults[name].default, UNITS[kind][name], scales) for name in scaled_names(kind)}
-
-
-def _flat(unit: Units) -> list[Unit]:
-    if isinstance(unit, Unit):
-        return [unit]
-    return [part for its in unit for part in _flat(its)]

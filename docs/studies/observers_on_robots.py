@@ -83,7 +83,7 @@ def floors(experiment: Experiment, held: Recorded) -> dict[str, float]:
     pushed = np.repeat((trajectory["time_s"] >= start - 1e-9)[:, None], held.worlds, axis=1)
     tilt = TiltFloor(dt, held.worlds)
     tilt.add(trajectory["y1_rad"], trajectory["x2_rad_s"], np.ones_like(pushed), pushed)
-    y1 = [tilt.errors(world)[1] or math.nan for world in range(held.worlds)]
+    y1 = [tilt.errors(world)[1] or math.nan for world in range(len(held.zero_errors))]
     noise = experiment.design.constructor_arguments[2]
     errors = float(np.mean(y1)), model_floor(experiment, end - start), acceleration_floor(noise, dt)
     return {name: 1.0 - error / held.zero_rms for name, error in zip(FLOORS, errors, strict=True)}

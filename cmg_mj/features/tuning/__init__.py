@@ -5,9 +5,8 @@ fitted on one set of worlds and scored on another.
 """
 
 from cmg_mj.features.tuning.fit import NoiseLevelResult
-from cmg_mj.features.tuning.logs import LogStudy, tune_on_logs
+from cmg_mj.features.tuning.logs import tune_on_logs
 from cmg_mj.features.tuning.simulations import (
-    BestNoise,
     Recorded,
     TuningResult,
     best_noise,
@@ -19,8 +18,6 @@ from cmg_mj.features.tuning.simulations import (
 )
 
 __all__ = [
-    "BestNoise",
-    "LogStudy",
     "NoiseLevelResult",
     "Recorded",
     "TuningResult",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -30,38 +32,93 @@ DIGITS = 4
 """Significant digits of the tuned parameters: what is written is what was scored."""
 AT_A_LIMIT = 1.02
 """A number this close to a limit of its range is at the limit."""
+RELEVANT = 1.01
+"""A smaller ratio of two errors on logs is no difference."""
 
 OnShare = Callable[[float], None]
 Stop = Callable[[], bool]
 """Asked before every evaluation: from the first yes on none is made, and the best so far counts."""
 
 
-class ScoringData(Protocol):
-    """Data on which parameters are scored: recorded worlds, or stretches of logs."""
+def judged(ratio: Interval, relevant: float = RELEVANT) -> PairedVerdict:
+    """Judge a ratio, above 1 for the better: it must differ by more than what is relevant, and beyond chance.
 
-    @property
-    def fell(self) -> int:
-        """Number of worlds that fell and are not scored."""
-        ...
+    Args:
+        ratio: With its 95 % interval.
+        relevant: The ratio from which there is a difference.
+    """
+    if 1.0 / relevant <= ratio.mean <= relevant:
+        return "tie"
+    return paired_verdict(Interval(*(value - 1.0 for value in ratio)))
 
-    @property
-    def worlds(self) -> int:
-        """Number of worlds or stretches."""
-        ...
+
+class ScoringData:
+    """Data on which parameters are scored: recorded worlds, or stretches of logs.
+
+    Attributes:
+        references: The rate of each recording that estimates are compared with, (n,) or (n, n_worlds) [rad/s].
+        stretches: Number of a recording, and its rows that are scored together.
+        largest_acceleration: Largest acceleration of the tilt, by differences of its rate [rad/s^2].
+        fell: Number of worlds that fell and are not scored.
+    """
+
+    references: Sequence[np.ndarray]
+    stretches: Sequence[tuple[int, np.ndarray]]
+    largest_acceleration: float
+    fell: int = 0
+
+    def rates(self, observers: Any) -> list[np.ndarray]:
+        """Return the estimated rates of an observer, or of one for each log [rad/s]."""
+        raise NotImplementedError
+
+    def errors(self, observers: Any) -> np.ndarray:
+        """Return the RMS of the estimated rate less the reference, (n,) [rad/s]; NaN where an observer fails.
+
+        Args:
+            observers: An observer, or one for each log.
+        """
+        with np.errstate(all="ignore"):
+            return self._rms(self.rates(observers))
+
+    @cached_property
+    def zero_errors(self) -> np.ndarray:
+        """Errors of an estimate of zero, one a world or a stretch [rad/s]."""
+        return self._rms([np.zeros(())] * len(self.references))
 
     @property
     def zero_rms(self) -> float:
         """Error of an estimate of zero, the mean over worlds or stretches [rad/s]."""
-        ...
+        return float(self.zero_errors.mean())
 
-    @property
-    def largest_acceleration(self) -> float:
-        """Largest acceleration of the tilt [rad/s^2]."""
-        ...
+    def _rms(self, rates: Sequence[np.ndarray]) -> np.ndarray:
+        off = [rate - reference for rate, reference in zip(rates, self.references, strict=True)]
+        return np.hstack([np.sqrt(np.mean(off[i][rows] ** 2, axis=0)) for i, rows in self.stretches])
 
-    def errors(self, observers: Any, /) -> np.ndarray:
-        """Return the RMS errors of an observer, or of one for each log, (n,) [rad/s]; NaN where an observer fails."""
-        ...
+
+@dataclass(frozen=True)
+class Study:
+    """An observer that was tuned.
+
+    Attributes:
+        kind: The observer.
+        start_parameters: Its parameters before.
+        numbers: The tuned numbers.
+        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
+    """
+
+    kind: str
+    start_parameters: ParameterValues
+    numbers: Sequence[TunedScalar]
+    insensitive_parameters: Sequence[str]
+
+    def common_figures(self) -> dict[str, SummaryValue]:
+        """Return the figures that a tuning on simulations and one on logs print with `--json`."""
+        return {
+            "observer": self.kind,
+            "given_parameters": plain(self.start_parameters),
+            "tuned": [number.name for number in self.numbers],
+            "idle": list(self.insensitive_parameters),
+        }
 
 
 @dataclass(frozen=True)
@@ -114,13 +171,12 @@ class NoiseLevelResult:
 
     @property
     def verdict(self) -> PairedVerdict:
-        """Compare the tuned parameters with the given ones, by the interval of the ratio.
+        """Compare the tuned parameters with the given ones, by the interval of the ratio."""
+        return self.judged(1.0)
 
-        Given parameters with which the observer fails are worse than any.
-        """
-        if not np.isfinite(self.given_rms).all():
-            return "better"
-        return paired_verdict(Interval(*(value - 1.0 for value in self.ratio)))
+    def judged(self, relevant: float) -> PairedVerdict:
+        """Compare as `judged` does; given parameters with which the observer fails are worse than any."""
+        return judged(self.ratio, relevant) if np.isfinite(self.given_rms).all() else "better"
 
     def limits(self, numbers: Sequence[TunedScalar]) -> list[str]:
         """Name the tuned numbers that ended at a limit of their range, with the limit."""
@@ -170,7 +226,7 @@ class ParameterFit:
         given: ParameterValues,
         chosen: Sequence[str],
         ranges: Mapping[str, tuple[float, float]] | None,
-        starts: int,
+        starts: int = 2,
         stop: Stop = lambda: False,
     ) -> None:
         self.kind, self._starts, self._stop, self._stopped = kind, starts, stop, False
@@ -178,6 +234,12 @@ class ParameterFit:
         self.numbers = numbers_of(kind, self.start_parameters, make, chosen, ranges or {})
         self.insensitive_parameters: list[str] = []
         self._best: Mapping[str, float] = {}
+
+    @property
+    def study(self) -> dict[str, Any]:
+        """What a `Study` has of it."""
+        names = ("kind", "start_parameters", "numbers", "insensitive_parameters")
+        return {name: getattr(self, name) for name in names}
 
     def level(
         self,
@@ -208,7 +270,7 @@ class ParameterFit:
             try:
                 return data.errors(make(**parameters))
             except Exception:  # a user's observer may fail in any way, at parameters nobody has tried
-                return np.full(data.worlds, math.nan)
+                return np.full(data.zero_errors.shape, math.nan)
 
         def mean_error(parameters: ParameterValues) -> float:
             """Return the mean error of the fitted data [rad/s]; infinite if an observer fails."""
@@ -227,7 +289,13 @@ class ParameterFit:
 
         given_loss = mean_error(self.start_parameters)
         if not self._best:
-            self._discard_insensitive(loss, given_loss)
+            with suppress(StopSearch):
+                idle = insensitive_numbers(loss, self.numbers, given_loss)
+                self.insensitive_parameters = [number.name for number in idle]
+                self.numbers = [number for number in self.numbers if number not in idle]
+            if not self.numbers:
+                names = ", ".join(self.insensitive_parameters)
+                raise InputError(f"the rate that {self.kind} estimates does not depend on {names}")
         count, expected = 0, evaluations(len(self.numbers))
         # The best values at the noise before are near the best at this one.
         near = [replace(n, start=self._best.get(n.name, n.start)) for n in self.numbers]
@@ -255,18 +323,6 @@ class ParameterFit:
             largest_acceleration=fitted.largest_acceleration,
             fell=fitted.fell + held_out.fell,
         )
-
-    def _discard_insensitive(self, loss: Callable[[Sequence[float]], float], given_loss: float) -> None:
-        """Discard the numbers that the estimated rate does not depend on."""
-        try:
-            insensitive = insensitive_numbers(loss, self.numbers, given_loss)
-        except StopSearch:
-            insensitive = []
-        self.insensitive_parameters = [number.name for number in insensitive]
-        if len(insensitive) == len(self.numbers):
-            names = ", ".join(self.insensitive_parameters)
-            raise InputError(f"the rate that {self.kind} estimates does not depend on {names}")
-        self.numbers = [number for number in self.numbers if number not in insensitive]
 
     def _named(self, sizes: Sequence[float]) -> dict[str, float]:
         return {number.name: size for number, size in zip(self.numbers, sizes, strict=True)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import NamedTuple
@@ -16,14 +16,15 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.log_replay import NO_MODEL, ObserverInputs, observer_inputs, replay_log
+from cmg_mj.features.replay.log_replay import NO_MODEL, observer_inputs, replay_log
 from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
-from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit
-from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, plain
+from cmg_mj.features.tuning.fit import RELEVANT, NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study, judged
+from cmg_mj.features.tuning.search import ParameterValues, plain
+from cmg_mj.features.tuning.simulations import plain_loop
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.observers.parameter_options import ParameterValue
-from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, paired_verdict, ratio_interval
+from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, ratio_interval
 from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay
@@ -36,8 +37,6 @@ BLOCKS = 10
 """Stretches of each log's part that are scored one by one, for an interval."""
 MIN_STRETCH_S = 0.5
 """Shortest stretches with an interval [s]; shorter ones are not independent."""
-RELEVANT = 1.01
-"""A smaller ratio of two errors is no difference."""
 SCENARIO = "push_recovery"
 """The scenario of the closed loop by default."""
 NO_LOOP = "none"
@@ -45,17 +44,6 @@ NO_LOOP = "none"
 LOOP_WORLDS = 16
 USUAL_S = 5.0
 """The loop runs for so long, or until the scenario ends [s]; longer only if the second after a push ends later."""
-
-
-def judged(ratio: Interval) -> PairedVerdict:
-    """Judge a ratio, above 1 for the better: it must differ by more than 1 %, and beyond chance.
-
-    Args:
-        ratio: With its 95 % interval.
-    """
-    if 1.0 / RELEVANT <= ratio.mean <= RELEVANT:
-        return "tie"
-    return paired_verdict(Interval(*(value - 1.0 for value in ratio)))
 
 
 @dataclass(frozen=True)
@@ -156,13 +144,7 @@ def compare_in_loop(
     """
     calm = max((end for _, end in push_windows(scenario.push)), default=0.0)  # a second after the last push
     duration = min(scenario.duration_s, max(USUAL_S, float(math.ceil(calm))))
-    loop = scenario.model_copy(
-        update={
-            "duration_s": duration,
-            "open_loop_observers": [],
-            "controller": scenario.controller.model_copy(update={"feedback": "observer", "bias_trim_s": 0.0}),
-        }
-    )
+    loop = plain_loop(scenario, duration, "observer")
     title = scenario.title or "the scenario"
     try:
         experiments = [
@@ -184,76 +166,48 @@ def compare_in_loop(
     return LoopComparison(title, duration, worlds, *counts, tilt_rms_ratio=ratio)
 
 
-class LogSegments:
+class LogSegments(ScoringData):
     """Parts of logs that are fitted or scored, in stretches of equal length.
 
     Args:
         logs: The parts.
         settle_s: Time from every start of an observer that is not scored [s].
-
-    Attributes:
-        shortest_s: Length of the shortest stretch [s].
-        worlds: Number of stretches.
-        zero_rms: Error of an estimate of zero: RMS of the reference, mean of the stretches [rad/s].
-        largest_acceleration: Largest acceleration of the tilt, by differences of the reference [rad/s^2].
     """
 
-    fell = 0
-
     def __init__(self, logs: Sequence[Log], settle_s: float) -> None:
-        self.logs, self._stretches = logs, []
-        for i, log in enumerate(logs):
-            scored = np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE]))
-            self._stretches += [(i, rows) for rows in np.array_split(scored, BLOCKS) if len(rows)]
-        self.worlds = len(self._stretches)
-        self.shortest_s = min(len(rows) * logs[i].dt for i, rows in self._stretches)
-        self.zero_rms = float(self._rms([-log[REFERENCE] for log in logs]).mean())
+        self.logs, self.references = logs, [log[REFERENCE] for log in logs]
+        self.stretches = [
+            (i, rows)
+            for i, log in enumerate(logs)
+            for rows in np.array_split(np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE])), BLOCKS)
+            if len(rows)
+        ]
         self.largest_acceleration = max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in logs)
 
-    def errors(self, observers: Sequence[Observer], /) -> np.ndarray:
-        """Return the RMS of the estimated rate less the reference in every stretch, (n_stretches,) [rad/s].
-
-        Args:
-            observers: One observer for each log.
-        """
-        errors = []
-        for log, observer in zip(self.logs, observers, strict=True):
-            rate = np.full(len(log), math.nan)
+    def rates(self, observers: Sequence[Observer]) -> list[np.ndarray]:
+        """See `ScoringData`."""
+        rates = [np.full(len(log), math.nan) for log in self.logs]
+        for log, observer, rate in zip(self.logs, observers, rates, strict=True):
             for part in log.parts:
-                with np.errstate(all="ignore"):
-                    rate[part] = replay(observer, log.trajectory(part)).x2
-            errors.append(rate - log[REFERENCE])
-        return self._rms(errors)
-
-    def _rms(self, errors: Sequence[np.ndarray]) -> np.ndarray:
-        with np.errstate(all="ignore"):
-            return np.array([math.sqrt(float(np.mean(errors[i][rows] ** 2))) for i, rows in self._stretches])
+                rate[part] = replay(observer, log.trajectory(part)).x2
+        return rates
 
 
 class LogEvidence(NamedTuple):
     """A log beside its errors."""
 
     log: Log
-    noise: MeasurementNoise
-    """Sensor noise that the observer assumed."""
     alignment: Alignment | None
     """Lag, scale and offset of the reference."""
-
-    @property
-    def remarks(self) -> list[str]:
-        """Remarks as in a replay."""
-        return remarks_on(self.log, self.alignment, self.noise)
+    noise: MeasurementNoise
+    """Sensor noise that the observer assumed."""
 
 
 @dataclass(frozen=True)
-class LogStudy:
+class LogStudy(Study):
     """An observer tuned on logs.
 
     Attributes:
-        kind: The observer.
-        start_parameters: Its parameters before.
-        numbers: The tuned numbers.
-        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
         logs: The logs.
         split: The share of each log that was fitted; the rest is scored.
         level: Tuned parameters and their scores.
@@ -261,10 +215,6 @@ class LogStudy:
         loop: Given and tuned parameters in a scenario's closed loop; None if none was asked for.
     """
 
-    kind: str
-    start_parameters: ParameterValues
-    numbers: Sequence[TunedScalar]
-    insensitive_parameters: Sequence[str]
     logs: Sequence[LogEvidence]
     split: float
     level: NoiseLevelResult
@@ -275,17 +225,41 @@ class LogStudy:
     def verdict(self) -> PairedVerdict | None:
         """Compare the tuned parameters with the given ones; None if the stretches are too short for an interval.
 
-        Better is better by more than 1 % and beyond chance, over the held-out stretches. Given parameters with which
-        the observer fails are worse than any.
+        Better is better by more than 1 % and beyond chance, over the held-out stretches.
         """
-        if not self.has_interval:
-            return None
-        return judged(self.level.ratio) if np.isfinite(self.level.given_rms).all() else "better"
+        return self.level.judged(RELEVANT) if self.stretch_s >= MIN_STRETCH_S else None
 
     @property
-    def has_interval(self) -> bool:
-        """Return whether the stretches are long enough for an interval."""
-        return self.stretch_s >= MIN_STRETCH_S
+    def title(self) -> str:
+        """The table's."""
+        return f"{', '.join(one.log.name for one in self.logs)}: {self.kind}"
+
+    @property
+    def rows(self) -> list[tuple[str, NoiseLevelResult, PairedVerdict | None]]:
+        """Names, levels and verdicts of the table's rows."""
+        return [(self.kind, self.level, self.verdict)]
+
+    def opening(self) -> Iterator[str]:
+        """Say what the errors are."""
+        for one in self.logs:
+            for remark in remarks_on(*one):
+                yield f"{one.log.name}: {remark}" if len(self.logs) > 1 else remark
+        share = f"{self.split:.0%} of each log, scored on the rest, in {len(self.level.rms)} stretches"
+        yield f"RMS of the estimated rate less the reference. Fitted on the first {share}."
+
+    def closing(self) -> Iterator[str]:
+        """Say why there is no verdict, or a tie, and what the tuned parameters do in a closed loop."""
+        ratio = self.level.ratio
+        if self.verdict is None:
+            short = f"No interval: the scored stretches are {self.stretch_s:.2g} s short"
+            yield f"{short}; there is one from {MIN_STRETCH_S:g} s on."
+        elif self.verdict == "tie" and ratio.low <= 1.0 <= ratio.high:
+            yield "A tie: the difference is not beyond chance."
+        elif self.verdict == "tie" and math.isfinite(ratio.mean):
+            off, least = abs(ratio.mean - 1.0), RELEVANT - 1.0
+            yield f"A tie: {off:.2%} of difference, where less than {least:.0%} counts for none."
+        if self.loop is not None:
+            yield self.loop.remark
 
     def settings(self) -> list[str]:
         """Return the tuned parameters as `--set` of a replay takes them."""
@@ -296,11 +270,8 @@ class LogStudy:
         """Return the figures that `cmg-mj tune-log --json` prints."""
         figures: dict[str, SummaryValue] = {
             "logs": [one.log.name for one in self.logs],
-            "observer": self.kind,
+            **self.common_figures(),
             "split": self.split,
-            "given_parameters": plain(self.start_parameters),
-            "tuned": [number.name for number in self.numbers],
-            "idle": list(self.insensitive_parameters),
             "noise": [
                 {
                     "tilt_rad": noise.tilt,
@@ -308,14 +279,14 @@ class LogStudy:
                     "correlation": noise.correlation,
                     **noise_figures(log, noise),
                 }
-                for log, noise, _ in self.logs
+                for log, _, noise in self.logs
             ],
-            "notes": [one.remarks for one in self.logs],
+            "notes": [remarks_on(*one) for one in self.logs],
             "reference": [one.alignment and one.alignment._asdict() for one in self.logs],
             "held_out_stretches": len(self.level.rms),
             "held_out_stretch_s": self.stretch_s,
             **self.level.figures(),
-            **({} if self.has_interval else {"held_out_ratio": None}),
+            **({} if self.verdict else {"held_out_ratio": None}),
             "verdict": self.verdict,
             **({"closed_loop": self.loop.figures()} if self.loop else {}),
         }
@@ -333,7 +304,6 @@ def tune_on_logs(
     settle_s: float = 1.0,
     parameters: Sequence[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
-    starts: int = 2,
     closed_loop: Scenario | None = None,
     on_share: OnShare | None = None,
 ) -> LogStudy:
@@ -349,7 +319,6 @@ def tune_on_logs(
         settle_s: Time from every start of an observer that is not scored [s].
         parameters: Names to tune; by default every number of the observer.
         ranges: Number -> smallest and largest size.
-        starts: Starts of a search in several dimensions.
         closed_loop: A scenario in whose loop the tuned parameters are compared with the given ones.
         on_share: Called now and then with the completed share.
 
@@ -364,43 +333,34 @@ def tune_on_logs(
     inputs = [
         observer_inputs(log, model=model, noises=noises, parameters={kind: start_parameters or {}}) for log in logs
     ]
-    _check_alike(kind, logs, inputs)
-    halves = [[log.cut(slice(0, end)), log.cut(slice(end, None))] for log in logs for end in [round(split * len(log))]]
-    for log_halves, log_inputs in zip(halves, inputs, strict=True):
-        for half in log_halves:  # an observer that cannot take part is refused, with the reason
-            replay_log(half, [kind], **log_inputs._asdict(), settle_s=settle_s)
-    fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
-    makers = [partial(make_observer, kind, logs[0].dt, own.model or NO_MODEL, own.noise) for own in inputs]
-
-    def one_per_log(**candidate: ParameterValue) -> list[Observer]:
-        return [make(**candidate) for make in makers]
-
-    fit = ParameterFit(kind, makers[0], inputs[0].parameters[kind], parameters, ranges, starts)
-    level = fit.level(one_per_log, fitted, held_out, on_share)
-    evidence = [LogEvidence(log, own.noise, alignment_of(log)) for log, own in zip(logs, inputs, strict=True)]
-    return LogStudy(
-        kind,
-        fit.start_parameters,
-        fit.numbers,
-        fit.insensitive_parameters,
-        evidence,
-        split,
-        level,
-        held_out.shortest_s,
-        closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
-    )
-
-
-def _check_alike(kind: str, logs: Sequence[Log], inputs: Sequence[ObserverInputs]) -> None:
-    """Refuse logs without a reference, and logs that differ in the sample period or the observer's parameters."""
-    first, parameters = logs[0], inputs[0].parameters[kind]
+    first, given, halves = logs[0], inputs[0].parameters[kind], []
     for log, own in zip(logs, inputs, strict=True):
         if "reference" not in log.has:
             raise InputError(f"{log.name}: no reference to tune to: name it, --columns rate=...")
         if abs(log.dt / first.dt - 1.0) > 1e-3:
             raise InputError(f"{log.name}: {1.0 / log.dt:g} Hz, {first.name} {1.0 / first.dt:g} Hz: give --rate HZ")
-        if own.parameters[kind] != parameters:
+        if own.parameters[kind] != given:
             raise InputError(
                 f"{first.name} and {log.name} ran with different parameters of {kind}: say with which to begin, "
                 "--set observer.NAME=VALUE"
             )
+        end = round(split * len(log))
+        halves.append([log.cut(slice(end)), log.cut(slice(end, None))])
+        for half in halves[-1]:  # an observer that cannot take part is refused, with the reason
+            replay_log(half, [kind], **own._asdict(), settle_s=settle_s)
+    fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
+    makers = [partial(make_observer, kind, first.dt, own.model or NO_MODEL, own.noise) for own in inputs]
+
+    def one_per_log(**candidate: ParameterValue) -> list[Observer]:
+        return [make(**candidate) for make in makers]
+
+    fit = ParameterFit(kind, makers[0], given, parameters, ranges)
+    level = fit.level(one_per_log, fitted, held_out, on_share)
+    return LogStudy(
+        **fit.study,
+        logs=[LogEvidence(log, alignment_of(log), own.noise) for log, own in zip(logs, inputs, strict=True)],
+        split=split,
+        level=level,
+        stretch_s=min(len(rows) * logs[i].dt for i, rows in held_out.stretches),
+        loop=closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
+    )

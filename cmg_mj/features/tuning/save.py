@@ -11,8 +11,8 @@ from rich.console import Group
 from rich.text import Text
 
 from cmg_mj.features.tuning.fit import NoiseLevelResult
-from cmg_mj.features.tuning.logs import MIN_STRETCH_S, RELEVANT, LogStudy
-from cmg_mj.features.tuning.simulations import TuningResult, best_noise, tuned_scenario, windows_of
+from cmg_mj.features.tuning.logs import LogStudy
+from cmg_mj.features.tuning.simulations import TuningResult, tuned_scenario
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.intervals import Interval
 from cmg_mj.results.tables import Row, Table
@@ -23,18 +23,8 @@ Study = TuningResult | LogStudy
 
 def study_table(study: Study) -> Group:
     """Return the table that `cmg-mj tune` and `tune-log` print, a row a noise level, and what explains it."""
-    levels = study.levels if isinstance(study, TuningResult) else [study.level]
-    if isinstance(study, TuningResult):
-        title, first = (
-            f"{study.scenario.title or 'Tuning'}: {study.kind}, seed {study.scenario.seed}",
-            "noise [ug/rtHz]",
-        )
-        names, verdicts = [f"{level.noise_ug_rthz:g}" for level in levels], [level.verdict for level in levels]
-    else:
-        title, first = f"{', '.join(one.log.name for one in study.logs)}: {study.kind}", "observer"
-        names, verdicts = [study.kind], [study.verdict]
     rows = []
-    for name, level, verdict in zip(names, levels, verdicts, strict=True):
+    for name, level, verdict in study.rows:
         sizes = {n.name: math.copysign(level.sizes[n.name], n.start) for n in study.numbers}
         rows.append(
             {
@@ -47,14 +37,15 @@ def study_table(study: Study) -> Group:
             }
         )
     columns = {
-        "first": first,
+        "first": "noise [ug/rtHz]" if isinstance(study, TuningResult) else "observer",
         **{number.name: f"{number.name} given {number.start:.4g}" for number in study.numbers},
         "rms": "error tuned [rad/s]",
         "given_rms": "error given [rad/s]",
         "ratio": "given / tuned, 95 %",
         "verdict": "tuned is",
     }
-    return Group(Table(columns, rows, title, _plain).rich(), Text("\n".join(_lines(study, levels))))
+    levels = [level for _, level, _ in study.rows]
+    return Group(Table(columns, rows, study.title, _plain).rich(), Text("\n".join(_lines(study, levels))))
 
 
 def _plain(row: Row, key: str) -> str:
@@ -72,23 +63,12 @@ def ratio_text(ratio: Interval) -> str:
 
 def _lines(study: Study, levels: Sequence[NoiseLevelResult]) -> Iterator[str]:
     """Explain the figures of the table."""
-    several = len(levels) > 1
-    if isinstance(study, TuningResult):
-        spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(study.scenario))
-        yield f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."
-        if not study.scenario.push:
-            yield "There is no push: the window is the whole run, where an estimate of zero may do best."
-    else:
-        for one in study.logs:
-            for remark in one.remarks:
-                yield f"{one.log.name}: {remark}" if len(study.logs) > 1 else remark
-        share = f"{study.split:.0%} of each log, scored on the rest, in {len(study.level.rms)} stretches"
-        yield f"RMS of the estimated rate less the reference. Fitted on the first {share}."
+    yield from study.opening()
     zero = [f"{level.zero_rms:.4f}" for level in levels]
     yield f"An estimate of zero: {' to '.join(dict.fromkeys([min(zero), max(zero)]))} rad/s."
     for level in levels:
         worse = [name for name, fit in (("tuned", level.fit), ("given", level.given_fit)) if not fit > 0.0]
-        at = f"At {level.noise_ug_rthz:g} ug/rtHz the" if several else "The"
+        at = f"At {level.noise_ug_rthz:g} ug/rtHz the" if len(levels) > 1 else "The"
         fits = f"fit there is {level.fit:.3f} tuned, {level.given_fit:.3f} given"
         yield f"{at} {fits}" + (f": worse than an estimate of zero, {' and '.join(worse)}." if worse else ".")
     if study.insensitive_parameters:
@@ -97,38 +77,7 @@ def _lines(study: Study, levels: Sequence[NoiseLevelResult]) -> Iterator[str]:
         yield f"* at a limit of its range: {', '.join(limits)}. Beyond it there may be better ones: --range."
     if fell := sum(level.fell for level in levels):
         yield f"Discarded: {fell} worlds that fell."
-    if isinstance(study, LogStudy):
-        yield from _verdict_lines(study)
-    elif several:
-        yield _best(study)
-
-
-def _best(study: TuningResult) -> str:
-    """Describe the noise at which the given parameters are the best ones."""
-    where, noise = best_noise(study)
-    if noise is None:
-        if where == "not bracketed":
-            return "The noises tried do not show at which one the given parameters are best."
-        return f"The given parameters are best at a noise {where} these, if at any."
-    if len(study.numbers) == 1:
-        return f"The given parameters are best at about {noise:.0f} ug/rtHz."
-    return f"Among these noises the given parameters lose least at {noise:g} ug/rtHz."
-
-
-def _verdict_lines(study: LogStudy) -> Iterator[str]:
-    """Say why there is no verdict, or a tie, and what the tuned parameters do in a closed loop."""
-    ratio = study.level.ratio
-    if not study.has_interval:
-        yield (
-            f"No interval: the scored stretches are {study.stretch_s:.2g} s short; there is one from "
-            f"{MIN_STRETCH_S:g} s on."
-        )
-    if study.verdict == "tie" and ratio.low <= 1.0 <= ratio.high:
-        yield "A tie: the difference is not beyond chance."
-    elif study.verdict == "tie" and math.isfinite(ratio.mean):
-        yield f"A tie: {abs(ratio.mean - 1.0):.2%} of difference, where less than {RELEVANT - 1.0:.0%} counts for none."
-    if study.loop is not None:
-        yield study.loop.remark
+    yield from study.closing()
 
 
 def save_study(folder: RunFolder | Path, study: Study, *, complete: bool = True) -> list[Path]:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 from scipy.stats import qmc
 
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.linear.slopes import numbers, rebuild
 from cmg_mj.observers import OBSERVER_CLASSES, Observer
 from cmg_mj.observers.parameter_options import ParameterValue
 
 SPAN = 1000.0
 """Range of the search: from the given value divided by this to the given value times this."""
+
+NUMERIC = (int, float, tuple, list)
+"""Types of the parameters that hold numbers."""
 
 MakeObserver = Callable[..., Observer]
 """Makes an observer from its parameters; raises InputError for those that it refuses."""
@@ -64,33 +66,28 @@ def parameters_of(kind: str, observer: Observer, arguments: ParameterValues) -> 
     signature = OBSERVER_CLASSES.takes(kind).values()
     defaults = {p.name: p.default for p in signature if p.name not in OBSERVER_CLASSES.bench_parameters}
     values = {name: getattr(observer, name, default) for name, default in {**defaults, **arguments}.items()}
-    return {name: _as_tuples(value) for name, value in values.items() if value is not inspect.Parameter.empty}
+    known = {name: value for name, value in values.items() if value is not inspect.Parameter.empty}
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in known.items()}
 
 
-def _as_tuples(value: ParameterValue | np.ndarray) -> ParameterValue:
-    """Convert arrays and lists to tuples."""
-    if isinstance(value, np.ndarray):
-        return _as_tuples(value.tolist())
-    return tuple(_as_tuples(item) for item in value) if isinstance(value, (list, tuple)) else value
+def _scalars(values: ParameterValues) -> dict[str, float]:
+    """Return all numbers in numeric parameters, by the names that users write."""
+    return {path[0] + "".join(f"[{i}]" for i in path[1:]): value for path, value in numbers(values)}
 
 
 def replaced(values: ParameterValues, sizes: Mapping[str, float]) -> dict[str, ParameterValue]:
     """Return the parameters with other sizes for some numbers, whose signs stay."""
-    return {name: _replaced(value, name, sizes) for name, value in values.items()}
-
-
-def _replaced(value: Any, name: str, sizes: Mapping[str, float]) -> ParameterValue:
-    if isinstance(value, tuple):
-        return tuple(_replaced(item, f"{name}[{i}]", sizes) for i, item in enumerate(value))
-    return math.copysign(float(sizes[name]), value) if name in sizes else value
+    numeric = {name: value for name, value in values.items() if isinstance(value, NUMERIC)}
+    changed = [math.copysign(sizes[n], value) if n in sizes else value for n, value in _scalars(numeric).items()]
+    return {**values, **rebuild(numeric, iter(changed))}
 
 
 def numbers_of(
     kind: str,
     values: ParameterValues,
     make: MakeObserver,
-    chosen: Sequence[str] = (),
-    ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    chosen: Sequence[str],
+    ranges: Mapping[str, tuple[float, float]],
 ) -> list[TunedScalar]:
     """Return the numbers to tune: every real number that is not zero, also inside tuples.
 
@@ -109,34 +106,26 @@ def numbers_of(
             empty.
     """
     integers = {p.name for p in OBSERVER_CLASSES.takes(kind).values() if p.annotation in (int, bool, "int", "bool")}
-    real = {name: value for name, value in values.items() if name not in integers}
-    candidates = [TunedScalar(place, start) for name, value in real.items() for place, start in _leaves(value, name)]
+    real = {name: v for name, v in values.items() if name not in integers and isinstance(v, NUMERIC)}
+    candidates = [
+        TunedScalar(name, float(start))
+        for name, start in _scalars(real).items()
+        if not isinstance(start, bool) and start and math.isfinite(start)
+    ]
     if not candidates:
         raise InputError(f"observer {kind} has no number to tune")
     allowed = {name for number in candidates for name in (number.parameter, number.name)}
     for name in chosen:
         if name not in allowed:
             raise InputError(f"--parameters {name}: {kind} has no such number to tune; {nearest(name, allowed)}")
-    numbers = [n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen]
-    names = [number.name for number in numbers]
+    tuned = {n.name: n for n in candidates if not chosen or n.parameter in chosen or n.name in chosen}
     for name, (low, high) in ranges.items():
-        if name not in names:
-            raise InputError(f"--range {name}: not tuned; {nearest(name, names, 'tuned')}")
+        if name not in tuned:
+            raise InputError(f"--range {name}: not tuned; {nearest(name, tuned, 'tuned')}")
         if not 0.0 < low < high < math.inf:
             raise InputError(f"--range {name}={low:g}:{high:g}: must be two positive numbers, the smaller first")
-    bounded = []
-    for number in numbers:
-        low, high = ranges[number.name] if number.name in ranges else _accepted_range(number, values, make)
-        bounded.append(replace(number, low=low, high=high))
-    return bounded
-
-
-def _leaves(value: ParameterValue, name: str) -> Iterator[tuple[str, float]]:
-    if isinstance(value, tuple):
-        for i, item in enumerate(value):
-            yield from _leaves(item, f"{name}[{i}]")
-    elif isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0.0 and math.isfinite(value):
-        yield name, float(value)
+    bounds = {name: ranges.get(name) or _accepted_range(number, values, make) for name, number in tuned.items()}
+    return [replace(number, low=bounds[name][0], high=bounds[name][1]) for name, number in tuned.items()]
 
 
 def _accepted_range(number: TunedScalar, values: ParameterValues, make: MakeObserver) -> tuple[float, float]:
@@ -164,8 +153,7 @@ def _accepted_range(number: TunedScalar, values: ParameterValues, make: MakeObse
 
 def plain(parameters: ParameterValues) -> dict[str, ParameterValue]:
     """Return parameters as JSON and TOML can hold them."""
-    known = (bool, int, float, str, tuple)
-    return {k: v if isinstance(v, known) else str(v) for k, v in parameters.items() if v is not None}
+    return {k: v if isinstance(v, (str, *NUMERIC)) else str(v) for k, v in parameters.items() if v is not None}
 
 
 GRID = 13
@@ -186,8 +174,6 @@ class StopSearch(Exception):
 
 Loss = Callable[[Sequence[float]], float]
 """Sizes -> a positive loss; infinite where there is none."""
-Height = Callable[[np.ndarray], float]
-"""Logarithms of sizes -> logarithm of the loss."""
 
 
 def insensitive_numbers(loss: Loss, numbers: Sequence[TunedScalar], start_loss: float) -> list[TunedScalar]:
@@ -221,7 +207,7 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
     Args:
         loss: The loss. It may raise `StopSearch`: then the best so far is returned.
         numbers: The tuned numbers.
-        starts: Number of starts in several dimensions; one is the given sizes alone.
+        starts: 2 starts in several dimensions, or 1, the given sizes alone.
 
     Returns:
         The best sizes and their loss, which is infinite if there is none.
@@ -240,7 +226,15 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
 
     with suppress(StopSearch):
         if len(numbers) > 1:
-            for first in _starts(height, low, high, start, starts):
+            firsts = [start]
+            if starts > 1:
+                reach = math.log(SCATTER_FACTOR)
+                floor, ceiling = np.maximum(low, start - reach), np.minimum(high, start + reach)
+                # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
+                cube = qmc.LatinHypercube(len(start), seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
+                scattered = floor + cube.random(SCATTER * len(start)) * (ceiling - floor)
+                firsts.append(min(scattered, key=height))
+            for first in firsts:
                 steps = np.where(first + FIRST_STEP <= high, FIRST_STEP, -np.minimum(FIRST_STEP, first - low))
                 corners = np.vstack([first, first + np.diag(steps)])
                 minimize(
@@ -268,19 +262,6 @@ def search(loss: Loss, numbers: Sequence[TunedScalar], *, starts: int = 2) -> tu
                 options={"xatol": TOLERANCE / 2.0},
             )
     return [float(size) for size in np.exp(np.clip(best[1], low, high))], math.exp(best[0])
-
-
-def _starts(height: Height, low: np.ndarray, high: np.ndarray, given: np.ndarray, starts: int) -> list[np.ndarray]:
-    """Return the given point, and the lowest of points scattered around it."""
-    if starts < 2:
-        return [given]
-    reach = math.log(SCATTER_FACTOR)
-    floor, ceiling = np.maximum(low, given - reach), np.minimum(high, given + reach)
-    # `seed` is what every scipy takes; the name `rng` is known from 1.15 on.
-    cube = qmc.LatinHypercube(len(given), seed=np.random.default_rng(0))  # pyright: ignore[reportCallIssue]
-    scattered = floor + cube.random(SCATTER * len(given)) * (ceiling - floor)
-    order = np.argsort([height(point) for point in scattered], kind="stable")
-    return [given, *(scattered[i] for i in order[: starts - 1])]
 
 
 def crossing(x: Sequence[float], y: Sequence[float]) -> float | None:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.controller import Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
-from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, Stop
-from cmg_mj.features.tuning.search import ParameterValues, TunedScalar, crossing, plain
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Stop, Study
+from cmg_mj.features.tuning.search import crossing
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
+from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
@@ -46,45 +48,25 @@ def window_of(scenario: Scenario) -> Window:
     return windows[0][0], windows[-1][1]
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """Measurements and commands of some worlds, all of which stood.
+class Recorded(ScoringData):
+    """Measurements and commands of some worlds, all of which stood, scored by the gyro.
 
-    Attributes:
+    Args:
         trajectory: Trajectory from the warm-up to the window's end.
         windows: Times that are scored [s].
         fell: Number of worlds that fell and are discarded.
     """
 
-    trajectory: Trajectory
-    windows: Sequence[Window]
-    fell: int = 0
+    def __init__(self, trajectory: Trajectory, windows: Sequence[Window], fell: int = 0) -> None:
+        self.trajectory, self.fell = trajectory, fell
+        self.references = [trajectory["fog_rad_s"]]
+        self.stretches = [(0, inside(trajectory["time_s"], windows))]
+        steps = np.diff(trajectory["x2_rad_s"], axis=0) / np.diff(trajectory["time_s"])[:, None]
+        self.largest_acceleration = float(np.abs(steps).max())
 
-    @property
-    def worlds(self) -> int:
-        """Number of worlds."""
-        return self.trajectory["y1_rad"].shape[1]
-
-    @property
-    def largest_acceleration(self) -> float:
-        """Largest acceleration of the tilt, by differences of its true rate [rad/s^2]."""
-        steps = np.diff(self.trajectory["x2_rad_s"], axis=0) / np.diff(self.trajectory["time_s"])[:, None]
-        return float(np.abs(steps).max())
-
-    @property
-    def zero_rms(self) -> float:
-        """Error of an estimate of zero: RMS of the gyro's rate over the windows, mean of the worlds [rad/s]."""
-        return float(self._rms(np.zeros(())).mean())
-
-    def errors(self, observer: Observer) -> np.ndarray:
-        """Return the RMS of the estimated rate less the gyro's, (n_worlds,) [rad/s]; NaN on failure."""
-        with np.errstate(all="ignore"):
-            return self._rms(replay(observer, self.trajectory).x2)
-
-    def _rms(self, rate: np.ndarray) -> np.ndarray:
-        difference = rate - self.trajectory["fog_rad_s"]
-        scored = inside(self.trajectory["time_s"], self.windows)
-        return np.sqrt(np.mean(difference[scored] ** 2, axis=0))
+    def rates(self, observers: Observer) -> list[np.ndarray]:
+        """See `ScoringData`."""
+        return [replay(observers, self.trajectory).x2]
 
 
 def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> Scenario:
@@ -107,30 +89,24 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     feedback = scenario.controller.feedback
     if feedback == "observer" and law_needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
-    loop = {"feedback": feedback, "bias_trim_s": 0.0}
-    return scenario.model_copy(
-        update={
-            "duration_s": duration,
-            "controller": scenario.controller.model_copy(update=loop),
-            "observer": ObserverSettings(kind="finite_difference"),  # its angles are the measured ones
-            "open_loop_observers": [],
-            "sensors": sensors,
-        }
-    )
+    observer = ObserverSettings(kind="finite_difference")  # its angles are the measured ones
+    return plain_loop(scenario, duration, feedback).model_copy(update={"observer": observer, "sensors": sensors})
 
 
-RecordingRequest = tuple[range, float | None]
-"""The worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)]."""
+def plain_loop(scenario: Scenario, duration_s: float, feedback: Feedback) -> Scenario:
+    """Return a scenario of another duration and feedback, without open-loop observers and trim."""
+    controller = scenario.controller.model_copy(update={"feedback": feedback, "bias_trim_s": 0.0})
+    return scenario.model_copy(update={"duration_s": duration_s, "controller": controller, "open_loop_observers": []})
 
 
 def recorder(
-    scenario: Scenario, requests: Sequence[RecordingRequest], *, warm_up_s: float = WARM_UP_S
+    scenario: Scenario, requests: Sequence[tuple[range, float | None]], *, warm_up_s: float = WARM_UP_S
 ) -> Callable[[range, float | None], Recorded]:
     """Make the recordings of one scenario, in one batch where possible.
 
     Args:
         scenario: The scenario, which `tuning_scenario` changes; its observer takes no part.
-        requests: The recordings.
+        requests: The worlds' numbers, and another noise density of the accelerometers [ug/sqrt(Hz)], of each.
         warm_up_s: Time before the window that is kept [s].
 
     Returns:
@@ -140,13 +116,12 @@ def recorder(
         InputError: Fewer than two worlds of a request stood.
         KeyboardInterrupt: The user interrupted.
     """
-    experiments = [prepare(tuning_scenario(scenario, noise)) for _, noise in requests]
-    jobs = [BatchJob([one] * len(worlds), worlds) for one, (worlds, _) in zip(experiments, requests, strict=True)]
+    jobs = [BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds) for worlds, noise in requests]
     windows, recordings = windows_of(scenario), {}
-    for request, experiment, result in zip(requests, experiments, run_jobs(jobs), strict=True):
+    for request, job, result in zip(requests, jobs, run_jobs(jobs), strict=True):
         if any(outcome.kind == "interrupted" for outcome in result.outcomes):
             raise KeyboardInterrupt
-        loop, stood = experiment.scenario, result.stood
+        loop, stood = job.experiments[0].scenario, result.stood
         if stood.sum() < 2:
             raise InputError(
                 f"{scenario.title or 'the scenario'}: with the law fed by the {loop.controller.feedback}, "
@@ -171,31 +146,49 @@ def halves(worlds: int, noise_ug_rthz: Sequence[float]) -> list[tuple[range, flo
 
 
 @dataclass(frozen=True)
-class TuningResult:
+class TuningResult(Study):
     """An observer tuned at one sensor noise or several.
 
     Attributes:
         scenario: The experiment.
-        kind: The observer.
-        start_parameters: Its parameters before.
-        numbers: The tuned numbers.
-        insensitive_parameters: Names of numbers that are not tuned, since the estimated rate does not depend on them.
         worlds: Number of worlds to fit; as many are held out for scoring.
         levels: Results by sensor noise, in ascending order.
     """
 
     scenario: Scenario
-    kind: str
-    start_parameters: ParameterValues
-    numbers: Sequence[TunedScalar]
-    insensitive_parameters: Sequence[str]
     worlds: int
     levels: Sequence[NoiseLevelResult]
 
     @property
-    def window(self) -> Window:
-        """Start and end of the scored time [s]."""
-        return window_of(self.scenario)
+    def title(self) -> str:
+        """The table's."""
+        return f"{self.scenario.title or 'Tuning'}: {self.kind}, seed {self.scenario.seed}"
+
+    @property
+    def rows(self) -> list[tuple[str, NoiseLevelResult, PairedVerdict | None]]:
+        """Names, levels and verdicts of the table's rows."""
+        return [(f"{level.noise_ug_rthz:g}", level, level.verdict) for level in self.levels]
+
+    def opening(self) -> Iterator[str]:
+        """Say what the errors are."""
+        spans = ", ".join(f"{start:g} s to {end:g} s" for start, end in windows_of(self.scenario))
+        yield f"RMS of the estimated rate less the gyro's, {spans}, on worlds that were not fitted."
+        if not self.scenario.push:
+            yield "There is no push: the window is the whole run, where an estimate of zero may do best."
+
+    def closing(self) -> Iterator[str]:
+        """Say at which noise the given parameters are the best ones."""
+        where, noise = best_noise(self)
+        if len(self.levels) < 2:
+            return
+        if where == "not bracketed":
+            yield "The noises tried do not show at which one the given parameters are best."
+        elif noise is None:
+            yield f"The given parameters are best at a noise {where} these, if at any."
+        elif len(self.numbers) == 1:
+            yield f"The given parameters are best at about {noise:.0f} ug/rtHz."
+        else:
+            yield f"Among these noises the given parameters lose least at {noise:g} ug/rtHz."
 
     def figures(self) -> Summary:
         """Return the figures that `cmg-mj tune --json` prints."""
@@ -211,14 +204,11 @@ class TuningResult:
         ]
         figures: dict[str, SummaryValue] = {
             "scenario": self.scenario.title,
-            "observer": self.kind,
             "seed": self.scenario.seed,
             "worlds_fitted": self.worlds,
-            "window_s": list(self.window),
+            "window_s": list(window_of(self.scenario)),
             "scored_s": [list(window) for window in windows_of(self.scenario)],
-            "given_parameters": plain(self.start_parameters),
-            "tuned": [number.name for number in self.numbers],
-            "idle": list(self.insensitive_parameters),
+            **self.common_figures(),
             "levels": levels,
             "given_best_at_noise_density_ug_rthz": best.noise_ug_rthz,
             **({"given_best_noise_is": best.where} if len(levels) > 1 else {}),
@@ -289,7 +279,7 @@ def tune(
             if not levels:
                 raise
             break
-    return TuningResult(scenario, kind, fit.start_parameters, fit.numbers, fit.insensitive_parameters, worlds, levels)
+    return TuningResult(**fit.study, scenario=scenario, worlds=worlds, levels=levels)
 
 
 class BestNoise(NamedTuple):
@@ -326,14 +316,12 @@ def best_noise(study: TuningResult) -> BestNoise:
         lost = [abs(value) for value in off]
     else:
         lost = [level.ratio.mean for level in levels]
-    if not np.isfinite(lost).all():
-        return BestNoise("not bracketed", None)
     least = int(np.argmin(lost))
-    if least in (0, len(levels) - 1):
-        return BestNoise("above" if least else "below", None)
-    if len(study.numbers) > 1:
+    if not np.isfinite(lost).all() or (len(study.numbers) == 1 and 0 < least < len(levels) - 1):
+        return BestNoise("not bracketed", None)
+    if 0 < least < len(levels) - 1:
         return BestNoise("found", levels[least].noise_ug_rthz)
-    return BestNoise("not bracketed", None)
+    return BestNoise("above" if least else "below", None)
 
 
 def tuned_scenario(study: TuningResult, level: NoiseLevelResult) -> Scenario:

@@ -12,7 +12,8 @@ from cmg_mj import load_scenario
 from cmg_mj.features.replay.log import Log, ReadOptions
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import tune_on_logs
-from cmg_mj.features.tuning.logs import LogStudy, LoopComparison, compare_in_loop, judged, loop_scenario
+from cmg_mj.features.tuning.fit import judged
+from cmg_mj.features.tuning.logs import LogStudy, LoopComparison, compare_in_loop, loop_scenario
 from cmg_mj.features.tuning.save import study_table
 from cmg_mj.results.intervals import Interval
 from tests.features.replay.motion import COLUMNS, sine, write_csv

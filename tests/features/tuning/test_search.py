@@ -18,7 +18,7 @@ def numbers(kind: str, *names: str) -> list[TunedScalar]:
     def make(**parameters: Any) -> Any:
         return make_observer(kind, DT, PAPER, **parameters)
 
-    return numbers_of(kind, parameters_of(kind, make(), {}), make, names)
+    return numbers_of(kind, parameters_of(kind, make(), {}), make, names, {})
 
 
 def test_every_number_is_found_also_in_tuples() -> None:
