@@ -16,7 +16,6 @@ from cmg_mj.core.arrays import Scalar, where
 from cmg_mj.core.types import Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.gyro_free import GyroFree, decorrelated
-from cmg_mj.observers.kalman import explained
 
 Scalars: TypeAlias = tuple[Scalar, ...]
 
@@ -165,22 +164,22 @@ class FreePivot(GyroFree):
         """
         h, d = self.dt, 1.0 / 6.0
         c, nn, rest = self._noise
-        p, z, b, w, pp, pz, pb, pw, _, zb, zw, bb, bw, ww, *_ = state
+        p, z, b, w, pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, *_ = state
 
         a = h * h * y.acceleration
         e = y.y1 - p - w - d * (a - b)
-        ep, ez, eb, ew = column = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
+        ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
         en = r * ((c - d) * nn)
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
-        kp, kz, kb, kw = gains = ep / ee, ez / ee, eb / ee, ew / ee
-        kn = en / ee
+        kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
 
-        P = explained(state[4:14], gains, column)
-        _, _, pb, _, _, zb, _, bb, bw, _ = P
+        pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
+        pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
+        pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
         mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
-        return e, ee, (a - b - n, p, z, b, w), (*P, pm, zm, bm, wm, mm)
+        return e, ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
 
     def _advance(self, means: Scalars, covariance: Scalars, early: Scalar, learnt: Scalars) -> State:
         """Doubt early samples, and advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white."""

@@ -17,7 +17,6 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
-from cmg_mj.observers.kalman import explained
 
 
 class State(NamedTuple):
@@ -104,7 +103,8 @@ class GyroFree:
         x1, x2 = p + d * alpha, z + 0.5 * h * alpha
 
         # What remains uncertain: of p, z, b, and of m = b + n, which is alpha's error.
-        pp, pz, pb, zz, zb, bb = explained(state[3:], (kp, kz, kb), (ep, ez, eb))
+        pp, pz, zz = pp - kp * ep, pz - kp * ez, zz - kz * ez
+        pb, zb, bb = pb - kp * eb, zb - kz * eb, bb - kb * eb
         pm, zm, bm = pb - kp * en, zb - kz * en, bb - kb * en
         mm = bm - kn * eb + nn - kn * en + self.jerk**2
 

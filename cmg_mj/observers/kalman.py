@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from itertools import combinations_with_replacement
-from operator import add
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, dot
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import TORQUE, Measurement
@@ -163,18 +161,38 @@ class Kalman:
     def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
         """Return the state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
+        p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
         f2, a, b, c, d = self.model.slopes(x1, x2, x3, u, torque)
         h, phi, psi, chi = self._integrals(a, b)
 
         jerk = a * x2 + c * u  # f2' but for b f2, which phi has
         x1, x2, x3 = x1 + h * x2 + psi * f2 + chi * jerk, x2 + phi * f2 + psi * jerk, x3 + h * u
 
-        # The first two rows of F, and of M = F P; the last two of F are those of the identity.
-        F1 = 1.0 + a * psi, phi, c * psi, d * psi
-        F2 = a * phi, 1.0 + b * phi + a * psi, c * phi, d * phi
-        M1, M2 = ([dot(row, [P[place] for place in column]) for column in COLUMNS] for row in (F1, F2))
-        moved = dot(M1, F1), dot(M1, F2), *M1[2:], dot(M2, F2), *M2[2:], *P[7:]
-        return (x1, x2, x3, torque), Covariance(*map(add, moved, self.process_noise))
+        f11, f12, f13, f14 = 1.0 + a * psi, phi, c * psi, d * psi
+        f21, f22, f23, f24 = a * phi, 1.0 + b * phi + a * psi, c * phi, d * phi
+        # F P, its first two rows; the last two of F are those of the identity.
+        m11 = f11 * p11 + f12 * p12 + f13 * p13 + f14 * p14
+        m12 = f11 * p12 + f12 * p22 + f13 * p23 + f14 * p24
+        m13 = f11 * p13 + f12 * p23 + f13 * p33 + f14 * p34
+        m14 = f11 * p14 + f12 * p24 + f13 * p34 + f14 * p44
+        m21 = f21 * p11 + f22 * p12 + f23 * p13 + f24 * p14
+        m22 = f21 * p12 + f22 * p22 + f23 * p23 + f24 * p24
+        m23 = f21 * p13 + f22 * p23 + f23 * p33 + f24 * p34
+        m24 = f21 * p14 + f22 * p24 + f23 * p34 + f24 * p44
+        q = self.process_noise
+        ahead = Covariance(
+            p11=m11 * f11 + m12 * f12 + m13 * f13 + m14 * f14 + q.p11,
+            p12=m11 * f21 + m12 * f22 + m13 * f23 + m14 * f24 + q.p12,
+            p13=m13 + q.p13,
+            p14=m14 + q.p14,
+            p22=m21 * f21 + m22 * f22 + m23 * f23 + m24 * f24 + q.p22,
+            p23=m23 + q.p23,
+            p24=m24 + q.p24,
+            p33=p33 + q.p33,
+            p34=p34 + q.p34,
+            p44=p44 + q.p44,
+        )
+        return (x1, x2, x3, torque), ahead
 
     def _integrals(self, a: Scalar, b: Scalar) -> tuple[float, Scalar, Scalar, Scalar]:
         """dt, phi, psi and chi after it: phi is the sum of k_n dt^n/n! with k_(n+1) = b k_n + a k_(n-1)."""
@@ -190,19 +208,7 @@ class Kalman:
 def _corrected(x: Four, P: Covariance, part: int, measured: Scalar, variance: float) -> tuple[Four, Covariance]:
     """Bring in one measured part of the state, whose noise has this variance."""
     column = [P[place] for place in COLUMNS[part]]
-    gains = [entry / (column[part] + variance) for entry in column]
+    gain = [entry / (column[part] + variance) for entry in column]
     off = measured - x[part]
-    x1, x2, x3, torque = (value + k * off for value, k in zip(x, gains, strict=True))
-    return (x1, x2, x3, torque), Covariance(*explained(P, gains, column))
-
-
-def explained(P: Sequence[Scalar], gains: Sequence[Scalar], column: Sequence[Scalar]) -> list[Scalar]:
-    """Return P - K c^T, one half of each: the covariance after a sample.
-
-    Args:
-        P: The covariance before, an entry a pair of states.
-        gains: K, on what was not expected of the sample.
-        column: c, covariances of the states with it.
-    """
-    pairs = combinations_with_replacement(range(len(gains)), 2)
-    return [entry - gains[i] * column[j] for entry, (i, j) in zip(P, pairs, strict=True)]
+    x1, x2, x3, torque = (value + k * off for value, k in zip(x, gain, strict=True))
+    return (x1, x2, x3, torque), Covariance(*(p - gain[i] * column[j] for p, (i, j) in zip(P, PAIRS, strict=True)))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, clip, dot
+from cmg_mj.core.arrays import Scalar, clip
 from cmg_mj.core.reduced_model import ReducedModel, Terms
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, Positive
@@ -166,13 +166,19 @@ def exact_step(
         odd = odd * t * t / ((2 * k) * (2 * k + 1))
         c0, c2, c1, c3 = c0 + even * f, c2 + even * g, c1 + odd * f, c3 + odd * g
 
-    def flow(x1: Scalar, x2: Scalar, y1: Scalar, y2: Scalar) -> list[Scalar]:
+    def flow(x1: Scalar, x2: Scalar, y1: Scalar, y2: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
         """exp(N t) applied to one column of [X; Y]."""
-        powers = [(x1, x2, y1, y2)]
+        r = [(x1, x2, y1, y2)]
         for _ in range(3):
             x1, x2, y1, y2 = y1, -x1 - a * x2, q1 * x1 + y2, q2 * x2 + a * y2
-            powers.append((x1, x2, y1, y2))
-        return [dot((c0, c1, c2, c3), entries) for entries in zip(*powers, strict=True)]
+            r.append((x1, x2, y1, y2))
+        v0, v1, v2, v3 = r
+        return (
+            c0 * v0[0] + c1 * v1[0] + c2 * v2[0] + c3 * v3[0],
+            c0 * v0[1] + c1 * v1[1] + c2 * v2[1] + c3 * v3[1],
+            c0 * v0[2] + c1 * v1[2] + c2 * v2[2] + c3 * v3[2],
+            c0 * v0[3] + c1 * v1[3] + c2 * v2[3] + c3 * v3[3],
+        )
 
     x11, x21, y11, y21 = flow(1.0, 0.0, h11, h12)
     x12, x22, y12, y22 = flow(0.0, 1.0, h12, h22)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, dot
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hurwitz
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, Positive
@@ -70,5 +70,10 @@ class Luenberger:
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
-        x1, x2, x3 = (dot(row, (*state, *y, u)) for row in self._rows)
-        return State(x1, x2, x3, *y), Estimate(x1, x2, x3)
+        p1, p2, p3, p4, p5 = state
+        y1, y2 = y
+        x1, x2, x3 = [
+            a * p1 + b * p2 + c * p3 + d * p4 + e * p5 + f * y1 + g * y2 + h * u
+            for a, b, c, d, e, f, g, h in self._rows
+        ]
+        return State(x1, x2, x3, y1, y2), Estimate(x1, x2, x3)
