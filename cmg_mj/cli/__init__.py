@@ -7,9 +7,9 @@ import io
 import os
 import pkgutil
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from typing import Any, ClassVar
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import ClassVar
 
 import click
 
@@ -50,10 +50,7 @@ OWN = {
 
 
 class Commands(click.Group):
-    """Commands that end with one line and exit status 130 on Ctrl-C, and that tolerate a closed output.
-
-    Each is imported when it is called.
-    """
+    """The commands, each of which is imported when it is called."""
 
     table: ClassVar = {**OWN, **COMMANDS}
 
@@ -69,31 +66,6 @@ class Commands(click.Group):
         """Write the table of commands, without importing any."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in self.table.items()])
-
-    def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
-    ) -> click.Context:
-        """Parse the arguments; --help prints here."""
-        with _ignore_broken_pipe():
-            return super().make_context(info_name, args, parent, **extra)
-
-    def invoke(self, ctx: click.Context) -> None:
-        """Run the command."""
-        try:
-            with _ignore_broken_pipe():
-                super().invoke(ctx)
-        except KeyboardInterrupt:
-            note("interrupted")
-            sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def _ignore_broken_pipe() -> Iterator[None]:
-    """End quietly when a reader such as head closes the pipe; click takes that for a failure."""
-    try:
-        yield
-    except BrokenPipeError as error:
-        raise click.exceptions.Exit(DONE) from error
 
 
 @click.group(
@@ -136,15 +108,20 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
         return WRONG_INPUT
     status = WRONG_INPUT
     try:
-        cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
+        if "_CMG_MJ_COMPLETE" in os.environ:  # a shell asks for completions
+            cli.main(prog_name="cmg-mj")
+        with cli.make_context("cmg-mj", list(arguments)) as context:
+            cli.invoke(context)
         return DONE
+    except click.exceptions.Exit as error:
+        return error.exit_code
     except click.ClickException as error:
         message = error.format_message()
     except (InputError, RunStopped) as error:
         message = str(error)
     except MemoryError:
         message = "there is not enough memory for this; take a shorter run or fewer worlds"
-    except (KeyboardInterrupt, click.Abort):  # before or after a command
+    except KeyboardInterrupt:
         message, status = "interrupted", INTERRUPTED
     except BaseException as error:
         message = _blame(error)

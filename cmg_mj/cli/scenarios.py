@@ -14,7 +14,6 @@ from cmg_mj.cli.arguments import (
     RunArguments,
     check_observer,
     markdown_option,
-    number_option,
     observer_option,
     observers_option,
     run_options,
@@ -50,11 +49,12 @@ from cmg_mj.inputs.features import DRIVERS
     help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C. The C runs on an "
     "emulated Cortex-M7 (board, see docs/board.md) or inside MuJoCo (plugin, see docs/plugin.md).",
 )
-@number_option(
+@click.option(
     "--world",
-    "Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
-    largest=2**63 - 1,  # tables hold it in 64 bits
+    type=click.IntRange(0),
     default=0,
+    metavar="N",
+    help="Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
 )
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens.")

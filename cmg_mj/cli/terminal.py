@@ -12,7 +12,7 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
 
@@ -29,13 +29,6 @@ DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
 MAX_LINE, MAX_WORD = 4000, 400
 """Characters of a message, and of a word in it, such as a path."""
-
-
-class OnProgress(Protocol):
-    """Moves a progress bar."""
-
-    def __call__(self, done: float, now: str | None = None) -> None:
-        """Show how much is done, and perhaps the current part."""
 
 
 class CtrlC:
@@ -149,17 +142,15 @@ def show(value: Any, table: RenderableType, as_json: bool) -> None:
         click.echo(json.dumps(value, indent=2) if as_json else table, file=own_stdout())
         return
     console = Console(file=own_stdout(), markup=False, highlight=False)  # [rad/s] is a unit
-    if console.is_terminal:
-        console.print(table)
-        return
-    console = Console(file=own_stdout(), markup=False, highlight=False, width=1000)
+    if not console.is_terminal:
+        console.width = 1000
     with console.capture() as captured:
         console.print(table)
     click.echo("\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n"), file=own_stdout())
 
 
 @contextmanager
-def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[OnProgress]:
+def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[Callable[..., None]]:
     """Show a progress bar on standard error until the end.
 
     Args:
@@ -168,7 +159,7 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
         ctrl_c: Checked on every call.
 
     Yields:
-        Function that moves the bar.
+        Function of how much is done, and perhaps of the current part, that moves the bar.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn

@@ -170,7 +170,7 @@ class Metrics:
         """Compute the time from the last push's end until |x1| stays inside the band [s]; None if it does not."""
         end = float(self._last_tick[world] * self._dt)
         first_inside = float((self._last_outside[world] + 1) * self._dt)
-        if not stood or self._last_tick[world] < 0 or first_inside > end + 1e-9 or end < self._push_end:
+        if not stood or first_inside > end + 1e-9 or end < self._push_end:
             return None
         return max(0.0, first_inside - self._push_end)
 

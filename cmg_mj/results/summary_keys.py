@@ -79,14 +79,9 @@ def heading(key: str) -> str:
     return KEYS[key].heading
 
 
-def format_figure(key: str, value: SummaryValue) -> str:
-    """Format a summary's number for a table; a dash where there is none."""
-    return "-" if value is None else KEYS[key].pattern.format(value)
-
-
-def format_difference(key: str, value: SummaryValue) -> str:
-    """Format a difference of two numbers for a table, with its sign."""
-    return "-" if value is None else KEYS[key].pattern.replace("{:", "{:+").format(value)
+def format_figure(key: str, value: SummaryValue, sign: str = "") -> str:
+    """Format a summary's number for a table; a dash where there is none. With the sign "+", it always has one."""
+    return "-" if value is None else KEYS[key].pattern.replace("{:", "{:" + sign).format(value)
 
 
 def capitalised(text: str) -> str:
@@ -170,4 +165,4 @@ def as_table(rows: Iterable[Summary]) -> pa.Table:
     worlds = list(rows)
     figures = dict.fromkeys(key for row in worlds for key in row if key not in ID_COLUMNS)
     schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
-    return pa.table({name: [row.get(name) for row in worlds] for name in schema.names}, schema=schema)
+    return pa.Table.from_pylist(worlds, schema=schema)

@@ -173,8 +173,7 @@ class ComparisonRow:
 
     def figures(self, key: str) -> np.ndarray:
         """Return a figure of every world, until its end, (n_worlds,); NaN where there is none."""
-        figures = [world.get(key) for world in self.entry.result.rows(self.reference)]
-        return np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
+        return self.entry.result.until_end(key, self.reference)
 
     def values(self, key: str) -> np.ndarray:
         """Return a figure of every world, (n_worlds,); NaN where a world did not stand or has no such figure."""
@@ -202,11 +201,11 @@ class ComparisonRow:
 def best_observer(compared: Sequence[ComparedObserver], key: str) -> ComparedObserver | None:
     """Find the observer with the best mean of a figure, among those that stood in the most worlds."""
     most = max(entry.result.stood.sum() for entry in compared)
-    sign = -1.0 if KEYS[key].better == "more" else 1.0
     candidates = [entry for entry in compared if entry.result.stood.sum() == most]
     means = [(finite_mean(ComparisonRow(entry).values(key)), entry) for entry in candidates]
-    known = [(sign * mean, entry) for mean, entry in means if mean is not None]
-    return min(known, key=lambda pair: pair[0])[1] if known else None
+    known = [(mean, entry) for mean, entry in means if mean is not None]
+    pick = max if KEYS[key].better == "more" else min
+    return pick(known, key=lambda pair: pair[0])[1] if known else None
 
 
 def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]:

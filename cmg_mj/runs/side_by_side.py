@@ -11,9 +11,8 @@ import numpy as np
 
 from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
-from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.batch import BatchedObservers, plant_structure, unique
-from cmg_mj.runs.experiment import Experiment, batch_inputs, run_batch
+from cmg_mj.runs.batch import BatchedObservers, unique
+from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 
 MAX_WORLDS = 1024
@@ -82,9 +81,8 @@ def _shared_key(job: BatchJob) -> Hashable:
     first = job.experiments[0]
     if first.axes or len({one.batch_key for one in unique(job.experiments)}) > 1:
         return None
-    key = first.batch_key.without_observer()
-    names = extra_signals(first.design.observer())
-    return key, plant_structure(first.plant), names, tuple(first.scenario.open_loop_names())
+    key = tuple(part for part in first.batch_key if not part[1])
+    return key, extra_signals(first.design.observer()), tuple(first.scenario.open_loop_names())
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:
@@ -96,8 +94,7 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
         parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
     experiments = [experiment for job in jobs for experiment in job.experiments]
     numbers = [int(number) for job in jobs for number in job.worlds]
-    inputs = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
-    whole = experiments[0].simulate(*inputs, **options)
+    whole = run_batch(experiments, numbers, observer=BatchedObservers(parts), **options)
     ends = np.cumsum([len(job.worlds) for job in jobs]).tolist()
     return [
         _renamed(whole.select(slice(end - len(job.worlds), end)), job.experiments[0].scenario.observer.kind)
@@ -109,12 +106,9 @@ def _renamed(result: Result, observer: str) -> Result:
     """Return a result with the name of the observer that these worlds had."""
     before, *open_loop = result.observers
     trajectory = result.trajectory
-    if trajectory is not None and before != observer:
+    if trajectory is not None:
         old, new = f"estimate/{before}/", f"estimate/{observer}/"
-        columns = {
-            new + name.removeprefix(old) if name.startswith(old) else name: values
-            for name, values in trajectory.columns.items()
-        }
+        columns = {name.replace(old, new): values for name, values in trajectory.columns.items()}
         layout = dataclasses.replace(trajectory.layout, observers=(observer, *open_loop))
-        trajectory = Trajectory(columns, trajectory.metadata, layout)
+        trajectory = dataclasses.replace(trajectory, columns=columns, layout=layout)
     return dataclasses.replace(result, observers=(observer, *open_loop), trajectory=trajectory)
