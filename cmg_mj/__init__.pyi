@@ -1,5 +1,7 @@
 """The public names and where each comes from: type checkers read them here, and lazy_loader when they are used."""
 
+__all__: list[str]
+
 from .core.axes import MultiAxisController as MultiAxisController
 from .core.controller import Controller as Controller
 from .core.controller import Tick as Tick

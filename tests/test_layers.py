@@ -212,7 +212,7 @@ def test_public_names_are_what_they_say() -> None:
 
 
 def test_public_names_are_listed_once() -> None:
-    _, *imports = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8")).body
+    _, _, *imports = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8")).body
     names = []
     for node in imports:
         assert isinstance(node, ast.ImportFrom)

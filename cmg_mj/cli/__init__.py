@@ -9,7 +9,7 @@ import pkgutil
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import click
 
@@ -20,8 +20,6 @@ from cmg_mj.inputs.features import COMMANDS, Command
 OBJECTS_A_COLLECTION = 50_000
 """New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
 makes a short run slower."""
-ExitStatus = str | int | None
-"""Exit status in the forms that `sys.exit` takes."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
 
 A scenario is the name of a bundled scenario (cmg-mj list scenarios) or the path of a TOML file.
@@ -84,8 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="backslashreplace")  # a title's letters where the terminal has only ASCII
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
-    status: ExitStatus = DONE
-    thresholds = gc.get_threshold()
+    status = DONE
     gc.set_threshold(OBJECTS_A_COLLECTION)
     try:
         status = _status(sys.argv[1:] if arguments is None else arguments)
@@ -95,13 +92,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
             status = WRONG_INPUT
         _detach_streams(error)
-    finally:
-        gc.set_threshold(*thresholds)
     if status != DONE:
         sys.exit(status)
 
 
-def _status(arguments: Sequence[str]) -> ExitStatus:
+def _status(arguments: Sequence[str]) -> Any:
     """Run a command, print its error if there is one, and return its exit status."""
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
@@ -124,28 +119,23 @@ def _status(arguments: Sequence[str]) -> ExitStatus:
     except KeyboardInterrupt:
         message, status = "interrupted", INTERRUPTED
     except BaseException as error:
-        message = _blame(error)
-        if message is None:
-            if isinstance(error, SystemExit):
-                return error.code
+        from cmg_mj.inputs.users_line import users_line
+
+        line = users_line(error.__traceback__)
+        if line is None and isinstance(error, SystemExit):
+            return error.code
+        if line is None:
             raise
+        message = f"{line}: raised {raised(error)}"  # by a user's own code where nobody expects it to run
     note(message)
     return status
-
-
-def _blame(error: BaseException) -> str | None:
-    """Describe what a user's own code raised where nobody expects it to run; None if it is not the user's."""
-    from cmg_mj.inputs.users_line import users_line
-
-    line = users_line(error.__traceback__)
-    return None if line is None else f"{line}: raised {raised(error)}"
 
 
 def _open_streams() -> None:
     """Open null devices for streams that the shell closed (`>&-`); else the next file would get their number."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  (open to the end)
 
 
 def _detach_streams(error: OSError) -> None:

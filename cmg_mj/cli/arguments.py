@@ -95,8 +95,9 @@ def settings_option(
 
 def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MAX_WORLDS)) -> Decorator:
     """Make the option `--worlds`."""
-    kind = click.IntRange(*range)
-    return click.option("--worlds", type=kind, default=default, show_default=True, metavar="N", help=help)
+    return click.option(
+        "--worlds", type=click.IntRange(*range), default=default, show_default=True, metavar="N", help=help
+    )
 
 
 def observer_option(role: str = "in the loop", **choice: Any) -> Decorator:

@@ -9,7 +9,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,19 +91,16 @@ class RunFolder:
                 if path.name not in written:
                     path.unlink()
             if written and not (wrong and all_or_none):
-                place = self._move_in(written, complete=complete and len(written) == len(files))
+                complete = complete and len(written) == len(files)
+                try:
+                    write_marker(self.part, written, complete=complete)
+                    place = next(place for place in numbered(self._folder) if self._takes(place, complete))
+                except OSError as error:
+                    raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
+                place = self.path if place == self._folder else self.path.with_name(place.name)
         if wrong:
             raise InputError("; ".join(f"{place / name}: cannot be written: {why}" for name, why in wrong.items()))
         return place
-
-    def _move_in(self, written: Sequence[str], *, complete: bool) -> Path:
-        """Rename the written folder into the first place that it may take."""
-        try:
-            write_marker(self.part, written, complete=complete)
-            place = next(place for place in numbered(self._folder) if self._takes(place, complete))
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
-        return self.path if place == self._folder else self.path.with_name(place.name)
 
     def _takes(self, place: Path, complete: bool) -> bool:
         """Rename the written folder into a place, unless what is there stays."""

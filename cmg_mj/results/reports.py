@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Container, Iterable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Group
 
@@ -93,7 +94,7 @@ def _difference_entry(summary: Row, key: str) -> str:
 
 def _with_interval(key: str, mean: float | None, ends: Sequence[float | None] | None, sign: str = "") -> str:
     known = [value for value in (mean, *(ends or ())) if value is not None]
-    interval = format_interval(KEYS[key].pattern, Interval(*known)) if len(known) == len(Interval._fields) else []
+    interval = format_interval(KEYS[key].pattern, Interval(*known)) if len(known) == 3 else []
     return "\n".join([format_figure(key, mean, sign), *interval])
 
 
@@ -185,9 +186,9 @@ def class_list(kind: UserClassKind) -> str:
     return "\n".join(lines)
 
 
-def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Join a title, and rows of a label and a text."""
-    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
+def lines(title: str, rows: Iterable[tuple[str, Any]]) -> str:
+    """Join a title, and rows of a label and a text; rows without a text are left out."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows if text)])
 
 
 def assignments(values: Mapping[str, TomlValue]) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.summary_keys import NESTED, Summary, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
 
@@ -114,8 +115,7 @@ class Result(NamedColumns):
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Return the mean of `values` over the worlds that have one; None if no world has."""
-        values = self.values(key, estimator)
-        known = values[np.isfinite(values)]
+        known = finite_values(self.values(key, estimator))
         return statistics.fmean(known) if len(known) else None
 
     @property

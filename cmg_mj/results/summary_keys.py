@@ -98,11 +98,9 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def section(summary: Mapping[str, SummaryValue], name: str) -> dict[str, Mapping[str, SummaryValue]]:
+def section(summary: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:
     """Return the summaries that a part of a summary holds, by name; none where there is no such part."""
-    part = summary.get(name)
-    pairs: Iterable[tuple[str, SummaryValue]] = part.items() if isinstance(part, Mapping) else ()
-    return {key: value for key, value in pairs if isinstance(value, Mapping)}
+    return {**summary.get(name, {})}
 
 
 def open_loop_figures(summary: Mapping[str, SummaryValue]) -> dict[str, Mapping[str, SummaryValue]]:
@@ -128,17 +126,15 @@ def combine_axes(axes: Mapping[str, Summary]) -> Summary:
 def _worst(summaries: Sequence[Mapping[str, SummaryValue]]) -> Summary:
     worst: Summary = {}
     for key in summaries[0]:
-        values = [summary[key] for summary in summaries if key in summary]
+        values: list[Any] = [summary[key] for summary in summaries if key in summary]
         if len(values) < len(summaries):  # the axes' observers differ
             continue
-        parts = [value for value in values if isinstance(value, Mapping)]
-        numbers = [value for value in values if isinstance(value, (int, float))]
-        if parts:
-            worst[key] = _worst(parts)
-        elif len(numbers) < len(values):
+        if isinstance(values[0], Mapping):
+            worst[key] = _worst(values)
+        elif None in values:
             worst[key] = None
         else:
-            worst[key] = min(numbers) if key in KEYS and KEYS[key].better == "more" else max(numbers, key=abs)
+            worst[key] = min(values) if key in KEYS and KEYS[key].better == "more" else max(values, key=abs)
     return worst
 
 

@@ -123,7 +123,7 @@ class NamedColumns:
 
     def keys(self) -> list[str]:
         """List the columns' names, in order; with it `dict(...)` takes all columns."""
-        return list(self.columns)
+        return list(self)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -202,7 +202,8 @@ class Trajectory(NamedColumns):
             return first
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
-        known = {f"{name}/{column}": axis[column] for name, axis in axes.items() for column in axis} | first.columns
+        known = {f"{name}/{column}": axis[column] for name, axis in axes.items() for column in axis}
+        known |= first.columns
         return Trajectory({name: known[name] for name in ("time_s", *layout.columns())}, layout=layout)
 
     def qpos(self, ticks: slice | np.ndarray = slice(None)) -> np.ndarray:
@@ -211,7 +212,7 @@ class Trajectory(NamedColumns):
 
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
-        alone, first = self.of_worlds(index), self.layout.columns()[0] if self.axes else SIGNALS[0]
+        alone, first = self.of_worlds(index), self.keys()[1]
         return alone._rows(np.isfinite(alone[first]))  # NaN after the world's end
 
     def of_worlds(self, worlds: np.ndarray | slice | int) -> Trajectory:
@@ -238,10 +239,10 @@ class Trajectory(NamedColumns):
         """
         import pyarrow as pa
 
-        columns = dict(self.columns)
-        of_many = [values for values in columns.values() if values.ndim == 2]
-        if of_many:
-            worlds = [self.world(index) for index in range(of_many[0].shape[1])]
+        columns = self.columns
+        *_, last = columns.values()
+        if last.ndim == 2:
+            worlds = [self.world(index) for index in range(last.shape[1])]
             number = np.repeat(np.arange(len(worlds)), [len(world) for world in worlds])
             columns = {"world": number, **{name: np.concatenate([world[name] for world in worlds]) for name in self}}
         return frame_of(pa.table(columns))
@@ -271,13 +272,11 @@ class Trajectory(NamedColumns):
         try:
             with open(path, "rb") as file:
                 table = pq.read_table(file)
-        except (OSError, pa.ArrowException) as error:
-            raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        try:
             stored = json.loads(table.schema.metadata[METADATA_KEY])
             layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
+        except (OSError, pa.ArrowException, ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
-                f"{path}: not a trajectory, or of an earlier version of cmg-mj: then run its scenario.toml again"
+                f"{path}: not a trajectory, or of an earlier version of cmg-mj, then run its scenario.toml again: "
+                f"{' '.join(str(error).split())}"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import State, extra_signals
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
@@ -24,12 +23,11 @@ from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors import Sensors
-from cmg_mj.stages.backlash import backlash
 
 T = TypeVar("T")
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
 """Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
-UNUSED = frozenset(marked_fields(Scenario, NoEffect))
+UNUSED = marked_fields(Scenario, NoEffect)
 """Fields on which no number of a run depends."""
 
 
@@ -62,12 +60,14 @@ def key_parts(scenario: Scenario, design: Design, prefix: str = "") -> Iterator[
 
 
 def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
-        fields = {str(i): part for i, part in enumerate(fields)}
-    if not isinstance(fields, Mapping):
+    if isinstance(fields, Mapping):
+        parts: Any = fields.items()
+    elif isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
+        parts = enumerate(fields)
+    else:
         yield at, fields
         return
-    for name, value in fields.items():
+    for name, value in parts:
         yield from _leaves(value, f"{at}.{name}" if at else name)
 
 
@@ -78,19 +78,6 @@ def can_vary_in_batch(field: str, law: str) -> bool:
     if mark is None or mark.law_field is None:
         return mark is not None
     return mark.law_field in getattr(LAW_CLASSES.find(law), "arrays", ())
-
-
-def stack_known_plants(plant: Plant, plants: Sequence[Plant], axis: int) -> KnownPlant:
-    """Combine the properties that a controller of many worlds knows of an axis.
-
-    Args:
-        plant: The plant with that axis alone.
-        plants: The plant of each world.
-        axis: The number of the axis.
-    """
-    tilt = stack_worlds([world_plant.axes[axis].radial_tilt for world_plant in plants])
-    gap = stack_worlds([world_plant.backlash for world_plant in plants])
-    return plant.interface._replace(tilt=tilt, servos=backlash(gap))
 
 
 def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, Outsides]:
@@ -109,6 +96,12 @@ def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, Outsi
     return law, stack_worlds([scenario.sensors for scenario in scenarios]), outside
 
 
+def neighbours(worlds: Sequence[int]) -> list[slice]:
+    """Find the places in a batch of groups of so many worlds, one beside the other."""
+    ends = np.cumsum(worlds).tolist()
+    return [slice(end - count, end) for end, count in zip(ends, worlds, strict=True)]
+
+
 class BatchedObservers:
     """Observers that stand beside each other in one batch, each in worlds of its own.
 
@@ -119,10 +112,8 @@ class BatchedObservers:
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
         self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
-        ends = np.cumsum([worlds for _, worlds in parts]).tolist()
-        self._parts = [
-            (observer, slice(end - worlds, end)) for (observer, worlds), end in zip(parts, ends, strict=True)
-        ]
+        observers, worlds = zip(*parts, strict=True)
+        self._parts = list(zip(observers, neighbours(worlds), strict=True))
 
     def init(self, y: Measurement) -> list[State]:
         """Return each observer's state at the first sample."""
@@ -141,8 +132,7 @@ class BatchedObservers:
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:
     """Take the measurement of some of the worlds."""
-    y1, y2 = y
-    return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
+    return Measurement(y.y1[worlds], y.y2[worlds], y.acceleration[worlds])  # type: ignore[index]
 
 
 def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer]:
@@ -164,11 +154,6 @@ def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer
         else observer
         for name, observer in observers[0].items()
     }
-
-
-def unique(items: Sequence[T]) -> list[T]:
-    """Return each of some things once."""
-    return list({id(item): item for item in items}.values())
 
 
 def stack_worlds(values: Sequence[T]) -> T:

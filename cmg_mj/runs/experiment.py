@@ -36,8 +36,7 @@ from cmg_mj.runs.batch import (
     batched_open_loop_observers,
     key_parts,
     plant_structure,
-    stack_known_plants,
-    unique,
+    stack_worlds,
 )
 from cmg_mj.runs.disturbances import Outsides, disturbances, outsides
 from cmg_mj.runs.recorder import TickRecorder
@@ -46,6 +45,7 @@ from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
+from cmg_mj.stages.backlash import backlash
 
 if TYPE_CHECKING:
     import control
@@ -180,7 +180,7 @@ class Experiment:
         experiments = [self] * len(numbers) if vary is None else self.with_varied(vary)
         return run_batch(experiments, numbers, plants, **options)
 
-    @property
+    @functools.cached_property
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
         prefixes = [f"axes.{axis.plant.axis.name}." for axis in self.axes] or [""]
@@ -205,10 +205,12 @@ class Experiment:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
         lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
-        if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
-            raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
-        if len({len(values) for values in lists}) > 1:
-            raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
+        are_lists = all(isinstance(values, Sequence) and not isinstance(values, str) for values in lists)
+        if not are_lists or len({len(values) for values in lists}) != 1:
+            raise InputError(
+                f"vary: {', '.join(vary)}: must be lists of values by field, as many values each, one a world, such as "
+                '{"equilibrium_bias_deg": [0.0, 0.5]}'
+            )
         of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
         names = [f"plant.{name}" if name in of_plant else name for name in vary]
         rows = [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
@@ -263,7 +265,7 @@ class Experiment:
         plants = [plant] if single else list(plant)
         if driver != "native" and not single:
             raise InputError(f"driver = {driver!r}: drives one world, not a batch")
-        names, settings, keep = plants[0].axis_names, self.scenario.metrics, options.get("keep_trajectory", True)
+        settings, keep = self.scenario.metrics, options.get("keep_trajectory", True)
         outside = outsides(self.scenario) if outside is None else outside
         acting = disturbances(outside, plants, controller.seed, controller.worlds)
         if single and any(one.accelerates for one in acting):
@@ -278,9 +280,9 @@ class Experiment:
                 outside,
                 settings,
                 keep=keep,
-                joints=name == names[0],
+                joints=axis is self.parts[0],
             )
-            for name, axis, part in zip(names, self.parts, controller.parts, strict=True)
+            for name, axis, part in zip(plants[0].axis_names, self.parts, controller.parts, strict=True)
         }
 
         def since(tick: int) -> Trajectory:
@@ -400,8 +402,8 @@ class Experiment:
         from cmg_mj.linear.verdict import hints  # as above
 
         if not self.axes:
-            of_features = [judge(self.design, self.plant).hints for judge in entries("judge").values()]
-            return [*hints(self.design, self.plant), *itertools.chain(*of_features)]
+            judgements = [judge(self.design, self.plant) for judge in entries("judge").values()]
+            return [*hints(self.design, self.plant), *(hint for judged in judgements for hint in judged.hints)]
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
     def resolved(self) -> dict[str, Any]:
@@ -510,10 +512,10 @@ def run_batch(
         raise InputError(
             "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
         )
-    first, *others = unique(experiments)
+    first = experiments[0]
     key = first.batch_key
-    for other in () if observer else others:
-        if (another := other.batch_key) != key:
+    for another in () if observer else (experiment.batch_key for experiment in experiments):
+        if another != key:
             words = next(part[0] for part in (*key, *another) if part not in key or part not in another)
             raise InputError(
                 f"run_many: {words} differs, which worlds of one batch must have in common; call run_many once for "
@@ -523,9 +525,11 @@ def run_batch(
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
         law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
+        tilt = stack_worlds([plant.axes[i].radial_tilt for plant in plants])
+        servos = backlash(stack_worlds([plant.backlash for plant in plants]))
         controllers.append(
             part.design.controller(
-                stack_known_plants(part.plant, plants, i),
+                part.plant.interface._replace(tilt=tilt, servos=servos),
                 worlds=worlds,
                 axis=i,
                 observer=observer,

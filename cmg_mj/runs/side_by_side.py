@@ -7,11 +7,9 @@ from collections.abc import Hashable, Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple, Unpack
 
-import numpy as np
-
 from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
-from cmg_mj.runs.batch import BatchedObservers, unique
+from cmg_mj.runs.batch import BatchedObservers, neighbours
 from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 
@@ -51,9 +49,7 @@ def run_jobs(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> 
     """
     results_of_jobs: dict[int, Result] = {}
     for batch in _batches(runs):
-        results: list[Result] = []
-        if len(batch) > 1:
-            results = _run_together([runs[i] for i in batch], options)
+        results = _run_together([runs[i] for i in batch], options) if len(batch) > 1 else []
         if not results or any(outcome.kind == "stopped" for result in results for outcome in result.outcomes):
             # An observer that raises stops all worlds of its batch: what the others do is seen without it.
             results = [run_batch(*runs[i], **options) for i in batch]
@@ -79,7 +75,7 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
 def _shared_key(job: BatchJob) -> Hashable:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
-    if first.axes or len({one.batch_key for one in unique(job.experiments)}) > 1:
+    if first.axes or len({one.batch_key for one in job.experiments}) > 1:
         return None
     key = tuple(part for part in first.batch_key if not part[1])
     return key, extra_signals(first.design.observer()), tuple(first.scenario.open_loop_names())
@@ -95,10 +91,10 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
     experiments = [experiment for job in jobs for experiment in job.experiments]
     numbers = [int(number) for job in jobs for number in job.worlds]
     whole = run_batch(experiments, numbers, observer=BatchedObservers(parts), **options)
-    ends = np.cumsum([len(job.worlds) for job in jobs]).tolist()
+    places = neighbours([len(job.worlds) for job in jobs])
     return [
-        _renamed(whole.select(slice(end - len(job.worlds), end)), job.experiments[0].scenario.observer.kind)
-        for job, end in zip(jobs, ends, strict=True)
+        _renamed(whole.select(place), job.experiments[0].scenario.observer.kind)
+        for job, place in zip(jobs, places, strict=True)
     ]
 
 

@@ -66,9 +66,7 @@ def test_options(command: str, wrong_input: list[str], fragments: list[str]) -> 
     ("list", ["list", "observer"], "'observer' is not one of 'scenarios', 'observers'"),
 )
 def test_commands(wrong_input: list[str], fragments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "cmg_mj.runs.experiment.Experiment.simulate", pytest.fail
-    )  # all this is found before anything is run
+    monkeypatch.setattr("cmg_mj.runs.experiment.Experiment.simulate", pytest.fail)  # all is found before a run
     assert_in_order(fragments, cmg_mj(*wrong_input).complaint)
     assert list(Path().iterdir()) == []
 
