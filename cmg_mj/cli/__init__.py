@@ -7,8 +7,8 @@ import io
 import os
 import pkgutil
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import click
@@ -20,8 +20,6 @@ from cmg_mj.inputs.features import COMMANDS, Command
 OBJECTS_A_COLLECTION = 50_000
 """New objects after which Python looks for cycles. Imports make many objects and few cycles: Python's default of 700
 makes a short run slower."""
-ExitStatus = str | int | None
-"""Exit status in the forms that `sys.exit` takes."""
 HELP = """A bench for gyroscopic stabilisation: a six-body scissored pair, realistic sensors, velocity observers.
 
 A scenario is the name of a bundled scenario (cmg-mj list scenarios) or the path of a TOML file.
@@ -50,10 +48,7 @@ OWN = {
 
 
 class Commands(click.Group):
-    """Commands that end with one line and exit status 130 on Ctrl-C, and that tolerate a closed output.
-
-    Each is imported when it is called.
-    """
+    """The commands, each of which is imported when it is called."""
 
     table: ClassVar = {**OWN, **COMMANDS}
 
@@ -69,31 +64,6 @@ class Commands(click.Group):
         """Write the table of commands, without importing any."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, command.help) for name, command in self.table.items()])
-
-    def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
-    ) -> click.Context:
-        """Parse the arguments; --help prints here."""
-        with _ignore_broken_pipe():
-            return super().make_context(info_name, args, parent, **extra)
-
-    def invoke(self, ctx: click.Context) -> None:
-        """Run the command."""
-        try:
-            with _ignore_broken_pipe():
-                super().invoke(ctx)
-        except KeyboardInterrupt:
-            note("interrupted")
-            sys.exit(INTERRUPTED)
-
-
-@contextmanager
-def _ignore_broken_pipe() -> Iterator[None]:
-    """End quietly when a reader such as head closes the pipe; click takes that for a failure."""
-    try:
-        yield
-    except BrokenPipeError as error:
-        raise click.exceptions.Exit(DONE) from error
 
 
 @click.group(
@@ -112,8 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="backslashreplace")  # a title's letters where the terminal has only ASCII
     if "" not in sys.path:
         sys.path.append("")  # a user's own observer in the current folder; last, so that it can hide nothing
-    status: ExitStatus = DONE
-    thresholds = gc.get_threshold()
+    status = DONE
     gc.set_threshold(OBJECTS_A_COLLECTION)
     try:
         status = _status(sys.argv[1:] if arguments is None else arguments)
@@ -123,52 +92,50 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not isinstance(error, BrokenPipeError):  # the reader, such as head, has had enough
             status = WRONG_INPUT
         _detach_streams(error)
-    finally:
-        gc.set_threshold(*thresholds)
     if status != DONE:
         sys.exit(status)
 
 
-def _status(arguments: Sequence[str]) -> ExitStatus:
+def _status(arguments: Sequence[str]) -> Any:
     """Run a command, print its error if there is one, and return its exit status."""
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
         return WRONG_INPUT
     status = WRONG_INPUT
     try:
-        cli.main(args=list(arguments), prog_name="cmg-mj", standalone_mode=False)
+        if "_CMG_MJ_COMPLETE" in os.environ:  # a shell asks for completions
+            cli.main(prog_name="cmg-mj")
+        with cli.make_context("cmg-mj", list(arguments)) as context:
+            cli.invoke(context)
         return DONE
+    except click.exceptions.Exit as error:
+        return error.exit_code
     except click.ClickException as error:
         message = error.format_message()
     except (InputError, RunStopped) as error:
         message = str(error)
     except MemoryError:
         message = "there is not enough memory for this; take a shorter run or fewer worlds"
-    except (KeyboardInterrupt, click.Abort):  # before or after a command
+    except KeyboardInterrupt:
         message, status = "interrupted", INTERRUPTED
     except BaseException as error:
-        message = _blame(error)
-        if message is None:
-            if isinstance(error, SystemExit):
-                return error.code
+        from cmg_mj.inputs.users_line import users_line
+
+        line = users_line(error.__traceback__)
+        if line is None and isinstance(error, SystemExit):
+            return error.code
+        if line is None:
             raise
+        message = f"{line}: raised {raised(error)}"  # by a user's own code where nobody expects it to run
     note(message)
     return status
-
-
-def _blame(error: BaseException) -> str | None:
-    """Describe what a user's own code raised where nobody expects it to run; None if it is not the user's."""
-    from cmg_mj.inputs.users_line import users_line
-
-    line = users_line(error.__traceback__)
-    return None if line is None else f"{line}: raised {raised(error)}"
 
 
 def _open_streams() -> None:
     """Open null devices for streams that the shell closed (`>&-`); else the next file would get their number."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8"))
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  (open to the end)
 
 
 def _detach_streams(error: OSError) -> None:

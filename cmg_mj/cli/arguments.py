@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,46 +51,25 @@ class RunArguments:
         """Load the scenario and apply the options."""
         from cmg_mj.scenario.loading import load_scenario
 
-        settings = [_as_utf8(setting) for setting in self.settings]
-        scenario = load_scenario(self.name, settings, observer)
+        scenario = load_scenario(self.name, self.settings, observer)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
-    def folder(
-        self,
-        label: str,
-        experiment: Experiment,
-        driver: str = "native",
-        world: int = 0,
-    ) -> RunFolder:
+    def folder(self, label: str, experiment: Experiment, driver: str = "native", world: int = 0) -> RunFolder:
         """Prepare the folder: --out, or one in runs/ named for the scenario, the label and the settings."""
         from cmg_mj.scenario.resolve import folder_suffix, safe_name
 
-        label = safe_name(label) + ("-board" if driver == "board" else "")
-        parts = (
-            safe_name(Path(self.name).stem),
-            label,
-            str(experiment.scenario.seed),
-            *([f"world{world}"] if world else []),
-        )
-        return claim_output(self.out, "-".join(parts) + folder_suffix(experiment.differences))
-
-
-def _as_utf8(argument: str) -> str:
-    """Decode an argument as UTF-8, also where Python takes the terminal for one of ASCII."""
-    try:
-        return os.fsencode(argument).decode("utf-8")
-    except UnicodeError:
-        return argument
+        how, which = "-board" if driver == "board" else "", f"-world{world}" if world else ""
+        name = f"{safe_name(Path(self.name).stem)}-{safe_name(label)}{how}-{experiment.scenario.seed}{which}"
+        return claim_output(self.out, name + folder_suffix(experiment.differences))
 
 
 def run_options(command: Command) -> Command:
     """Add the arguments of every command that runs a scenario, which it takes as one `RunArguments`."""
 
     @functools.wraps(command)
-    def with_arguments(
-        scenario: str, settings: tuple[str, ...], seed: int | None, out: str | None, as_json: bool, **others: Any
-    ) -> None:
-        command(RunArguments(scenario, settings, seed, out, as_json), **others)
+    def with_arguments(scenario: str, **given: Any) -> None:
+        own = {name: given.pop(name) for name in ("settings", "seed", "out", "as_json")}
+        command(RunArguments(scenario, **own), **given)
 
     options = all_of(click.argument("scenario"), settings_option(), seed_option(), out_option(), json_option())
     return options(with_arguments)
@@ -108,17 +86,6 @@ def all_of(*decorators: Decorator) -> Decorator:
     return decorate
 
 
-def number_option(name: str, help: str, largest: int, default: int | None = None) -> Decorator:
-    """Make an option for a number from 0 on; `--help` does not show the largest one."""
-
-    def check(context: click.Context, parameter: click.Parameter, number: int | None) -> int | None:
-        if number is not None and not 0 <= number <= largest:
-            raise click.BadParameter(f"{number} is not in the range 0<=x<={largest}.")
-        return number
-
-    return click.option(name, type=int, metavar="N", default=default, callback=check, help=f"{help}  [x>=0]")
-
-
 def settings_option(
     help: str = "Set a field of the scenario, such as plant.initial_tilt_deg=2.0.", metavar: str = "FIELD=VALUE"
 ) -> Decorator:
@@ -128,18 +95,17 @@ def settings_option(
 
 def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MAX_WORLDS)) -> Decorator:
     """Make the option `--worlds`."""
-    kind = click.IntRange(*range)
-    return click.option("--worlds", type=kind, default=default, show_default=True, metavar="N", help=help)
+    return click.option(
+        "--worlds", type=click.IntRange(*range), default=default, show_default=True, metavar="N", help=help
+    )
 
 
-def observer_option(role: str = "in the loop", default: str | None = None, *, required: bool = False) -> Decorator:
-    """Make the option `--observer`, which refuses an observer that does not exist."""
-    choice: dict[str, Any] = (
-        {"required": True} if required else {"default": default, "show_default": True}
-    )  # None is a default, too
+def observer_option(role: str = "in the loop", **choice: Any) -> Decorator:
+    """Make the option `--observer`, with a `default` or `required`; it refuses an observer that does not exist."""
     return click.option(
         "--observer",
         metavar="NAME",
+        show_default=True,
         callback=lambda context, parameter, name: None if name is None else check_observer("--observer", name),
         help=f"Observer {role}: a name, or your own as package.module:Class.",
         **choice,
@@ -156,9 +122,16 @@ def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: b
     """
 
     def parse(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
+        from cmg_mj.observers import OBSERVERS
+        from cmg_mj.results.baselines import RATES
+
         if text is None:
             return None
-        names = observer_names(text, baselines=baselines)
+        names = list(OBSERVERS) if text == "all" else names_in(text)
+        if not names:
+            raise InputError(f"--observers {text!r}: give names separated by commas, or all")
+        allowed = RATES if baselines else ()
+        names = [name if name in allowed else check_observer("--observers", name, allowed) for name in names]
         return list(dict.fromkeys(names)) if distinct else names
 
     default = f"  [default: {otherwise}]" if otherwise else ""
@@ -175,7 +148,7 @@ def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: b
 
 def seed_option() -> Decorator:
     """Make the option `--seed`."""
-    return number_option("--seed", "Seed of the sensors' noise.", 2**128 - 1)
+    return click.option("--seed", type=click.IntRange(0), metavar="N", help="Seed of the sensors' noise.")
 
 
 def out_option() -> Decorator:
@@ -238,18 +211,6 @@ def overwrites() -> bool:
 def names_in(text: str) -> list[str]:
     """Parse names separated by commas."""
     return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def observer_names(text: str, *, baselines: bool = False) -> list[str]:
-    """Parse observers separated by commas, or `all`; repeated names stay, and baselines where they are allowed."""
-    from cmg_mj.observers import OBSERVERS
-    from cmg_mj.results.baselines import RATES
-
-    names = list(OBSERVERS) if text == "all" else names_in(text)
-    if not names:
-        raise InputError(f"--observers {text!r}: give names separated by commas, or all")
-    allowed = RATES if baselines else ()
-    return [name if name in allowed else check_observer("--observers", name, allowed) for name in names]
 
 
 def check_observer(option: str, name: str, others: Sequence[str] = ()) -> str:

@@ -41,29 +41,27 @@ def description(name: str, part: Experiment) -> str:
     compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     imperfections = scenario.sensors.accelerometer.imperfections
-    changes = settings.changes()
     torques = [
         ("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push
     ]
     torques += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
     missing = list(omissions(scenario).values())
-    omitted = f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"
     judgements = [judge(design, part.plant) for judge in entries("judge").values()]
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
-        *([("", assignments(changes))] if changes else []),
+        ("", assignments(settings.changes())),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         *_law_rows(design, fields["controller"]),
         ("observer", f"{scenario.observer.kind}  {assignments(observer)}".rstrip()),
-        *([("", OWN_CODE)] if ":" in scenario.observer.kind else []),
+        ("", ":" in scenario.observer.kind and OWN_CODE),
         ("open loop", ", ".join(scenario.open_loop_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
-        *([("", f"accelerometer: {assignments(imperfections)}")] if imperfections else []),
-        *([("compare", f"{', '.join(compare.names())}; {compare.worlds} worlds")] if compare else []),
+        ("", imperfections and f"accelerometer: {assignments(imperfections)}"),
+        ("compare", compare and f"{', '.join(compare.names())}; {compare.worlds} worlds"),
         *torques,
         *_pivot_rows(part.plant),
-        *([("omitted", omitted)] if missing else []),
+        ("omitted", missing and f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"),
         *(row for judgement in judgements for row in judgement.rows),
         *(("hint", hint) for hint in hints(design, part.plant)),
         *(("hint", hint) for judgement in judgements for hint in judgement.hints),
@@ -93,8 +91,7 @@ def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple
     else:
         yield "law", f"{controller.kind} {limits}"
         parameters = {name: value for name, value in fields.items() if name not in ControllerSettings.model_fields}
-        if parameters:
-            yield "", assignments(parameters)
+        yield "", assignments(parameters)
     yield "", inputs if law_needs(law) else "takes nothing of the observer, which is judged only"
     if controller.notch_hz:
         yield "", f"notch at {controller.notch_hz:g} Hz on the command"

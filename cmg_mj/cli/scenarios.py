@@ -12,9 +12,7 @@ import click
 
 from cmg_mj.cli.arguments import (
     RunArguments,
-    check_observer,
     markdown_option,
-    number_option,
     observer_option,
     observers_option,
     run_options,
@@ -50,11 +48,12 @@ from cmg_mj.inputs.features import DRIVERS
     help="Run the controller in the simulation loop (native), in MuJoCo's control callback, or as C. The C runs on an "
     "emulated Cortex-M7 (board, see docs/board.md) or inside MuJoCo (plugin, see docs/plugin.md).",
 )
-@number_option(
+@click.option(
     "--world",
-    "Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
-    largest=2**63 - 1,  # tables hold it in 64 bits
+    type=click.IntRange(0),
     default=0,
+    metavar="N",
+    help="Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
 )
 @click.option("--plot", is_flag=True, help="Also write plot.png.")
 @click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens.")
@@ -87,13 +86,17 @@ def run(
     note_hints(experiment.hints)
     if scenario.compare:
         note("[compare] is for cmg-mj compare; this is one run")
-    label = runs.file_name(scenario.observer.kind)
-    folder = arguments.folder(label, experiment, driver, world)
-    live_view = runs.live_view(experiment) if live else None
+    folder = arguments.folder(runs.file_name(scenario.observer.kind), experiment, driver, world)
+    live_view = None
+    if live:
+        from cmg_mj.runs.live import LiveView
+
+        live_view = LiveView(runs.recording_header(experiment), scenario.observer.kind)
     with CtrlC() as ctrl_c:
         with progress(scenario.title or arguments.name, scenario.duration_s, ctrl_c) as on_progress:
-            watched: SimulationOptions = {"on_progress": on_progress}
-            options = live_view.options(on_progress) if live_view else watched
+            options: SimulationOptions = {"on_progress": on_progress}
+            if live_view:
+                options = live_view.options(on_progress)
             result = experiment.run(driver=driver, world=world, **options)
         if live_view:
             live_view.show()
@@ -148,8 +151,6 @@ def compare(
     scenario = arguments.scenario()
     settings = scenario.compare or CompareSettings()
     names, worlds = observers or settings.names(), worlds or settings.worlds
-    for name in names:
-        check_observer("compare.observers:", name)
     for setting in arguments.settings:
         if setting.startswith("observer.") and scenario.observer.kind not in names:
             raise InputError(
@@ -231,7 +232,7 @@ def _scenario_beside(model: Path) -> str:
     place = model.absolute().parent if model.parent == Path() else model.parent
     stem = place.name.removesuffix("_plugin")
     mounted = place.with_name(f"{stem}.xml") if stem != place.name else model
-    for path in dict.fromkeys((model, mounted)):
+    for path in (model, mounted):
         with suppress(OSError, ValueError, AttributeError):  # a scenario that cannot be read is none
             scenario = tomllib.loads(path.with_suffix(".toml").read_text(encoding="utf-8"))
             if scenario.get("plant", {}).get("model") == path.name:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 import click
 
@@ -23,19 +23,10 @@ if TYPE_CHECKING:
 
     from cmg_mj.results.folder import RunFolder
 
-    Handler = Callable[[int, FrameType | None], None] | signal.Handlers
-
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 """Exit statuses."""
 MAX_LINE, MAX_WORD = 4000, 400
 """Characters of a message, and of a word in it, such as a path."""
-
-
-class OnProgress(Protocol):
-    """Moves a progress bar."""
-
-    def __call__(self, done: float, now: str | None = None) -> None:
-        """Show how much is done, and perhaps the current part."""
 
 
 class CtrlC:
@@ -50,27 +41,20 @@ class CtrlC:
 
     def __init__(self) -> None:
         self.noted = False
-        self._replaced: list[tuple[signal.Signals, Handler]] = []
+        self._replaced: list[tuple[int, Any]] = []
 
     def __enter__(self) -> CtrlC:
         # Signals that somebody else handles (another thread, a job in the background) stay as they are.
-        defaults: dict[str, Handler] = {
-            "SIGINT": signal.default_int_handler,
-            "SIGTERM": signal.SIG_DFL,
-            "SIGHUP": signal.SIG_DFL,
-        }
         if threading.current_thread() is threading.main_thread():
-            for name, handler in defaults.items():
+            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
                 number = getattr(signal, name, None)  # Windows has no SIGHUP
-                if number is not None and signal.getsignal(number) == handler:
-                    signal.signal(number, self._note)
-                    self._replaced.append((number, handler))
+                if number and signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
+                    self._replaced.append((number, signal.signal(number, self._note)))
         return self
 
     def __exit__(self, *exception: object) -> None:
         for number, handler in self._replaced:
             signal.signal(number, handler)
-        self._replaced.clear()
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         if self.noted:
@@ -145,21 +129,20 @@ def show(value: Any, table: RenderableType, as_json: bool) -> None:
     """Print a value as JSON, or a table (or text) as wide as the terminal; in full width without a terminal."""
     from rich.console import Console
 
-    if as_json or isinstance(table, str):
-        click.echo(json.dumps(value, indent=2) if as_json else table, file=own_stdout())
-        return
-    console = Console(file=own_stdout(), markup=False, highlight=False)  # [rad/s] is a unit
-    if console.is_terminal:
-        console.print(table)
-        return
-    console = Console(file=own_stdout(), markup=False, highlight=False, width=1000)
-    with console.capture() as captured:
-        console.print(table)
-    click.echo("\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n"), file=own_stdout())
+    if as_json:
+        table = json.dumps(value, indent=2)
+    elif not isinstance(table, str):
+        console = Console(file=own_stdout(), markup=False, highlight=False)  # [rad/s] is a unit
+        if not console.is_terminal:
+            console.width = 1000
+        with console.capture() as captured:
+            console.print(table)
+        table = "\n".join(line.rstrip() for line in captured.get().splitlines()).strip("\n")
+    click.echo(table, file=own_stdout())
 
 
 @contextmanager
-def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[OnProgress]:
+def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[Callable[..., None]]:
     """Show a progress bar on standard error until the end.
 
     Args:
@@ -168,19 +151,14 @@ def progress(label: str, total: float, ctrl_c: CtrlC | None = None) -> Iterator[
         ctrl_c: Checked on every call.
 
     Yields:
-        Function that moves the bar.
+        Function of how much is done, and perhaps of the current part, that moves the bar.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress, TextColumn
 
     console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-    )
-    bar = Progress(*columns, console=console, transient=True)
+    _, *columns = Progress.get_default_columns()
+    bar = Progress(TextColumn("{task.description}", markup=False), *columns, console=console, transient=True)
     task = bar.add_task(label, total=total)
 
     position = -total

@@ -82,11 +82,11 @@ class FusedGyro:
         if start:
             self._reading = reading[0]
             self._turn = self._dt * (reading[0] if self._bias is None else np.full_like(reading[0], self._bias))
-        before = np.vstack([self._reading[None], reading[:-1]])
+        before = np.vstack([self._reading, reading[:-1]])
         turns = 0.5 * self._dt * (before + reading)
         if start:
             turns[0] = 0.0
-        turned = np.cumsum(np.vstack([self._turned[None], turns]), axis=0)[1:]
+        turned = np.cumsum(np.vstack([self._turned, turns]), axis=0)[1:]
         self._reading, self._turned = reading[-1], turned[-1]
         biases = self._filter(y1 - turned, self._next_gains(len(reading)))
         return reading - biases / self._dt

@@ -130,7 +130,7 @@ class TiltFloor:
         inputs[:, -1] = x2.T
         return inputs
 
-    def errors(self, world: int) -> tuple[float | None, float | None]:
+    def errors(self, world: int) -> list[float | None]:
         """Compute the filter's error in one world.
 
         Args:
@@ -139,15 +139,15 @@ class TiltFloor:
         Returns:
             RMS error in the whole run and in the push windows [rad/s]; None where there are too few samples for a fit.
         """
-        return self._error(0, world), self._error(1, world)
-
-    def _error(self, part: int, world: int) -> float | None:
-        products, count = self._products[part, world], self._counts[part, world]
-        if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
-            return None
-        taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]
-        residual = np.append(taps, -1.0)
-        return math.sqrt(max(residual @ products @ residual, 0.0) / count)
+        errors: list[float | None] = []
+        for products, count in zip(self._products[:, world], self._counts[:, world], strict=True):
+            if count < ROWS_A_TAP * self._taps or not np.isfinite(products).all():
+                errors.append(None)
+                continue
+            taps = np.linalg.lstsq(products[:-1, :-1], products[:-1, -1], rcond=1e-13)[0]
+            residual = np.append(taps, -1.0)
+            errors.append(math.sqrt(max(residual @ products @ residual, 0.0) / count))
+        return errors
 
 
 def _edges(memory: int) -> list[int]:

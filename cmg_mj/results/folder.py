@@ -10,7 +10,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,9 +52,9 @@ class RunFolder:
             self._folder = folder = Path(os.path.abspath(path))  # a user's code may change the current folder
             self._made = [parent for parent in folder.parents if not parent.exists()]
             if folder in (Path.cwd(), *Path.cwd().parents):
-                raise InputError(f"--out {path}: is the current folder, or holds it; name another folder")
+                raise OSError(0, "is the current folder, or holds it; name another folder")
             if os.path.lexists(folder) and not folder.is_dir():
-                raise InputError(f"--out {path}: cannot be written: is no folder")
+                raise OSError(0, "is no folder")
             self.part = _hidden(folder, "part")
             folder.parent.mkdir(parents=True, exist_ok=True)
             recover(folder)
@@ -76,61 +76,50 @@ class RunFolder:
         Raises:
             InputError: A file cannot be written. The others are, unless it is all or none.
         """
-        wrong: dict[str, BaseException] = {}
-        for name, write in files.items():
-            try:
-                write(self.part / name)
-            except BaseException as error:  # such as a title that no file can hold
-                (self.part / name).unlink(missing_ok=True)
-                wrong[name] = error
-                if not isinstance(error, Exception):  # Ctrl-C, for the second time
-                    break
+        wrong: dict[str, str] = {}
+        written: list[str] = []
         place = self.path
-        written = [name for name in files if name not in wrong and (self.part / name).exists()]
-        if written and not (wrong and all_or_none):
-            try:
-                write_marker(self.part, written, complete=complete and not wrong)
-                place = self._move_in()
-            except OSError as error:
-                raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
-        for error in wrong.values():
-            if not isinstance(error, Exception):
-                raise error
+        try:
+            for name, write in files.items():
+                try:
+                    write(self.part / name)
+                    written.append(name)
+                except Exception as error:  # such as a title that no file can hold
+                    wrong[name] = getattr(error, "strerror", None) or raised(error)
+        finally:  # also on Ctrl-C, for the second time
+            for path in self.part.iterdir():
+                if path.name not in written:
+                    path.unlink()
+            if written and not (wrong and all_or_none):
+                complete = complete and len(written) == len(files)
+                try:
+                    write_marker(self.part, written, complete=complete)
+                    place = next(place for place in numbered(self._folder) if self._takes(place, complete))
+                except OSError as error:
+                    raise InputError(f"{self.path}: cannot be written: {error.strerror}") from error
+                place = self.path if place == self._folder else self.path.with_name(place.name)
         if wrong:
-            reasons = {name: getattr(error, "strerror", None) or raised(error) for name, error in wrong.items()}
-            raise InputError("; ".join(f"{place / name}: cannot be written: {why}" for name, why in reasons.items()))
+            raise InputError("; ".join(f"{place / name}: cannot be written: {why}" for name, why in wrong.items()))
         return place
 
-    def _move_in(self) -> Path:
-        """Rename the written folder into the first place that it may take."""
-        for place in numbered(self._folder):
-            old = _hidden(place, "old")
-            with suppress(OSError):
-                place.rmdir()  # if it is empty
-            if os.path.lexists(place):
-                if not self._may_replace(place):
-                    continue
-                place.rename(old)
-            try:
-                self.part.rename(place)
-            except OSError:
-                if not os.path.lexists(place):
-                    if old.exists():
-                        old.rename(place)
-                    raise
-                continue  # another run has just come here
-            finally:
-                if old.exists():
-                    remove(old)
-            return self.path if place == self._folder else self.path.with_name(place.name)
-        raise AssertionError("numbered() does not end")
-
-    def _may_replace(self, place: Path) -> bool:
-        if not is_own(place):
-            return False
-        if is_complete(place) and not is_complete(self.part):
-            return False
-        return self._overwrite or all(_text(place / name) == _text(self.part / name) for name in REQUESTS)
+    def _takes(self, place: Path, complete: bool) -> bool:
+        """Rename the written folder into a place, unless what is there stays."""
+        old = _hidden(place, "old")
+        with suppress(OSError):
+            place.rmdir()  # if it is empty
+        if os.path.lexists(place):
+            asked = self._overwrite or all(_text(place / name) == _text(self.part / name) for name in REQUESTS)
+            if not asked or not is_own(place) or (is_complete(place) and not complete):
+                return False
+            place.rename(old)
+        try:
+            self.part.rename(place)
+        except OSError:
+            if os.path.lexists(place):  # another run has just come here
+                return False
+            raise
+        shutil.rmtree(old, ignore_errors=True)
+        return True
 
     def release(self, *_: object) -> None:
         """Remove what was made for nothing."""
@@ -145,11 +134,9 @@ class RunFolder:
     __exit__ = release
 
 
-@contextmanager
-def claimed(folder: RunFolder | Path) -> Iterator[RunFolder]:
-    """Enter a folder that may have been prepared already."""
-    with nullcontext(folder) if isinstance(folder, RunFolder) else RunFolder(folder) as claim:
-        yield claim
+def claimed(folder: RunFolder | Path) -> RunFolder:
+    """Prepare a folder, unless it is prepared already."""
+    return folder if isinstance(folder, RunFolder) else RunFolder(folder)
 
 
 def numbered(folder: Path) -> Iterator[Path]:
@@ -158,7 +145,7 @@ def numbered(folder: Path) -> Iterator[Path]:
     if folder.name in ("", ".."):
         folder = Path(os.path.abspath(folder))
     for number in itertools.count(2):
-        yield folder.with_name(f"{folder.name}-{number}")
+        yield Path(f"{folder}-{number}")
 
 
 def write_marker(folder: Path, names: Iterable[str], *, complete: bool) -> None:
@@ -167,11 +154,10 @@ def write_marker(folder: Path, names: Iterable[str], *, complete: bool) -> None:
     (folder / MARKER).write_text("\n".join(lines), encoding="utf-8", errors="surrogateescape")
 
 
-def _marker(folder: Path) -> tuple[str, set[Path]]:
-    """Read whether a folder's result is complete, and its files; an empty word where there is none of cmg_mj's."""
-    marker = folder / MARKER
-    state, *names = ((is_plain_file(marker) and _text(marker)) or "").split("\n")
-    return (state, {folder / name for name in names}) if state in ("complete", "incomplete") else ("", set())
+def _marker(folder: Path) -> tuple[str, list[Path]]:
+    """Read whether a folder's result is complete, and its files; an empty word where there is no marker."""
+    state, *names = (_text(folder / MARKER) or "").split("\n")
+    return state, [folder / name for name in names]
 
 
 def is_complete(folder: Path) -> bool:
@@ -182,45 +168,26 @@ def is_complete(folder: Path) -> bool:
 
 def is_own(folder: Path) -> bool:
     """Return whether cmg_mj wrote everything in a folder."""
-    if folder.is_symlink() or not folder.is_dir():
-        return False
     state, files = _marker(folder)
-    files.add(folder / MARKER)
-    folders = {parent for file in files for parent in file.parents}
-    return state != "" and all(
-        path in files if is_plain_file(path) else path in folders and not path.is_symlink()
-        for path in folder.rglob("*")
+    known = {folder / MARKER, *files, *(parent for file in files for parent in file.parents)}
+    return (
+        state in ("complete", "incomplete")
+        and not folder.is_symlink()
+        and all(path in known and not path.is_symlink() for path in folder.rglob("*"))
     )
 
 
-def remove(folder: Path) -> None:
-    """Remove what cmg_mj wrote in a folder, its marker last, and the folder unless something else is in it."""
-    _, files = _marker(folder)
-    with suppress(OSError):
-        for path in sorted(folder.rglob("*"), reverse=True):
-            if path in files and is_plain_file(path):
-                path.unlink()
-            elif path.is_dir():
-                path.rmdir()
-        if set(folder.iterdir()) <= {folder / MARKER}:
-            shutil.rmtree(folder)
-
-
 def recover(folder: Path) -> None:
-    """Put back what a killed process moved out of a folder's place, and remove what it left half written."""
+    """Put back what a killed process moved out of a folder's place, and remove what it left beside it."""
     for path in folder.parent.iterdir():
-        left = re.fullmatch(rf"\.({re.escape(folder.name)}(?:-\d+)?)\.(\d+)-\d+\.(part|old)", path.name)
+        left = re.fullmatch(rf"\.({re.escape(folder.name)}(?:-\d+)?)\.(\d{{1,9}})-\d+\.(part|old)", path.name)
         if not left or path.is_symlink() or _is_alive(int(left[2])):
             continue
-        place = folder.with_name(left[1])
-        if left[3] == "part":
-            shutil.rmtree(path, ignore_errors=True)
-            continue
-        whole = all(file.is_file() for file in _marker(path)[1])
-        if whole and not os.path.lexists(place):
+        place, (_, files) = folder.with_name(left[1]), _marker(path)
+        if left[3] == "old" and files and all(file.is_file() for file in files) and not os.path.lexists(place):
             path.rename(place)
-        elif not whole or is_own(place):
-            remove(path)
+        else:
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _hidden(folder: Path, ending: str) -> Path:
@@ -233,10 +200,8 @@ def _is_alive(process: int) -> bool:
         return True
     try:
         os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        pass
+    except OSError as error:
+        return isinstance(error, PermissionError)
     return True
 
 
@@ -267,22 +232,13 @@ def signed(text: str, ending: str) -> bytes:
 
 def is_signed(path: Path) -> bool:
     """Return whether a file begins with the line that `signed` puts there."""
-    if not is_plain_file(path):
-        return False
-    line = SIGNATURES[path.suffix].encode()
-    with path.open("rb") as file:
-        return file.read(len(line)) == line
+    return path.is_file() and not path.is_symlink() and path.read_bytes().startswith(signed("", path.suffix))
 
 
 METADATA_KEY = b"cmg_mj"
 """The key of what cmg_mj says of a table, as JSON, in the metadata of its Parquet file."""
 ROW_GROUP = 32768
 """Number of rows that Arrow compresses together, and that a reader may skip."""
-
-
-def is_plain_file(path: Path) -> bool:
-    """Return whether this is a file, and neither a link to one nor a pipe or a device."""
-    return path.is_file() and not path.is_symlink()
 
 
 @contextmanager
@@ -301,8 +257,7 @@ def whole_file(path: Path, ending: str = "") -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     finally:
-        with suppress(FileNotFoundError):
-            temporary.unlink()
+        temporary.unlink(missing_ok=True)
 
 
 def write_parquet(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:

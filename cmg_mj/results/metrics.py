@@ -55,9 +55,8 @@ class Metrics:
         self._ticks = 0
         # What is summed, and over which ticks -> sum in each world
         self._sums: dict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros(n_worlds))
-        self._gimbal_peak = np.zeros(n_worlds)
-        self._last_outside = np.full(n_worlds, -1)
-        self._last_tick = np.full(n_worlds, -1)
+        # Largest gimbal angle, last tick outside the band, last tick, -1 for none -> in each world
+        self._largest: dict[str, np.ndarray] = defaultdict(lambda: np.full(n_worlds, -1.0))
 
     def update(self, columns: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray]) -> None:
         """Add the next ticks.
@@ -89,11 +88,14 @@ class Metrics:
             if estimate is not None:
                 self._sums[f"{name} bias", "sum"] += _sum(estimate, bias_ticks)
                 self._add_squares(f"{name} bias", estimate - self._biases, bias=bias_ticks)
-        gimbal = np.where(counted, np.abs(columns["x3_rad"]), 0.0)
-        self._gimbal_peak = np.maximum(self._gimbal_peak, gimbal.max(axis=0, initial=0.0))
         outside = counted & (np.abs(x1) > self._band)
-        self._last_outside = np.maximum(self._last_outside, np.where(outside, tick, -1).max(axis=0, initial=-1))
-        self._last_tick = np.maximum(self._last_tick, np.where(counted, tick, -1).max(axis=0, initial=-1))
+        for what, values, rows in (
+            ("gimbal", np.abs(columns["x3_rad"]), counted),
+            ("outside", tick, outside),
+            ("tick", tick, counted),
+        ):
+            largest = np.where(rows, values, -1.0).max(axis=0, initial=-1.0)
+            self._largest[what] = np.maximum(self._largest[what], largest)
 
     def _add_squares(self, what: str, values: np.ndarray, **ticks: np.ndarray) -> None:
         for part, counted in ticks.items():
@@ -139,7 +141,7 @@ class Metrics:
             "settle_time_s": self._settle_time(world, stood),
             **self._rate_figures(loop, world),
             "tilt_rms_deg": None if tilt is None else math.degrees(tilt),
-            "gimbal_peak_deg": math.degrees(self._gimbal_peak[world]) if n else None,
+            "gimbal_peak_deg": math.degrees(self._largest["gimbal"][world]) if n else None,
             "command_rms_rad_s": self._rms(world, "command"),
             "command_saturated_fraction": float(self._sums["saturated", "run"][world] / n) if n else None,
             **self._bias_figures(loop, world),
@@ -168,9 +170,9 @@ class Metrics:
 
     def _settle_time(self, world: int, stood: bool) -> float | None:
         """Compute the time from the last push's end until |x1| stays inside the band [s]; None if it does not."""
-        end = float(self._last_tick[world] * self._dt)
-        first_inside = float((self._last_outside[world] + 1) * self._dt)
-        if not stood or self._last_tick[world] < 0 or first_inside > end + 1e-9 or end < self._push_end:
+        end = float(self._largest["tick"][world] * self._dt)
+        first_inside = float((self._largest["outside"][world] + 1) * self._dt)
+        if not stood or first_inside > end + 1e-9 or end < self._push_end:
             return None
         return max(0.0, first_inside - self._push_end)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Container, Iterable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Group
 
@@ -18,7 +19,6 @@ from cmg_mj.results.summary_keys import (
     OPEN_LOOP_COLUMNS,
     SummaryValue,
     capitalised,
-    format_difference,
     format_figure,
     heading,
     open_loop_figures,
@@ -38,12 +38,6 @@ after a second at rest; mems_fused, as bought, in a Kalman filter with y1; floor
 lower bounds on the error from the measured tilt, and from tilt and angular acceleration."""
 
 
-def compared_keys(summaries: Sequence[Row]) -> list[str]:
-    """List the summary keys that are compared, that of stopped worlds only if there are any."""
-    stopped = any(summary["stopped_fraction"] for summary in summaries)
-    return [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
-
-
 def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
     """Tabulate a comparison.
 
@@ -54,9 +48,10 @@ def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
     Returns:
         The means with their 95 % intervals and, if there are any, the paired differences to the best of each column.
     """
-    keys = compared_keys(summaries)
+    stopped = any(summary["stopped_fraction"] for summary in summaries)
+    keys = [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
     tables = [Table(_headings("observer", keys), summaries, title, _mean_entry)]
-    differences = [section(summary, "minus_best") for summary in summaries]
+    differences = [summary["minus_best"] for summary in summaries]
     if any(less["interval"] for row in differences for less in row.values()):
         headings = _headings("observer", [key for key in keys if any(key in row for row in differences)])
         tables.append(Table(headings, summaries, "Less the best of each column, world by world", _difference_entry))
@@ -89,31 +84,25 @@ def _headings(first: str, keys: Iterable[str]) -> dict[str, str]:
 
 
 def _mean_entry(summary: Row, key: str) -> str:
-    intervals = summary["intervals"]
-    ends = intervals.get(key) if isinstance(intervals, Mapping) else None
-    return _with_interval(format_figure(key, summary[key]), key, summary[key], ends)
+    return _with_interval(key, summary[key], summary["intervals"].get(key))
 
 
 def _difference_entry(summary: Row, key: str) -> str:
-    less = section(summary, "minus_best").get(key)
-    if less is None:
-        return "best"
-    return _with_interval(format_difference(key, less["mean"]), key, less["mean"], less["interval"])
+    less = summary["minus_best"].get(key)
+    return "best" if less is None else _with_interval(key, less["mean"], less["interval"], "+")
 
 
-def _with_interval(text: str, key: str, mean: SummaryValue, ends: SummaryValue) -> str:
-    match mean, ends:
-        case float(), [float() as low, float() as high]:
-            return "\n".join([text, *format_interval(KEYS[key].pattern, Interval(mean, low, high))])
-    return text
+def _with_interval(key: str, mean: float | None, ends: Sequence[float | None] | None, sign: str = "") -> str:
+    known = [value for value in (mean, *(ends or ())) if value is not None]
+    interval = format_interval(KEYS[key].pattern, Interval(*known)) if len(known) == 3 else []
+    return "\n".join([format_figure(key, mean, sign), *interval])
 
 
 def run_title(summary: Row) -> str:
     """Name a run in a line: scenario, observer, seed, world, what differs from the bundled scenario."""
     place = " on the board" if summary.get("driver") == "board" else ""
     world = f", world {summary['world']}" if "world" in summary else ""
-    changes = summary["differs"]
-    differs = describe_differences(changes) if isinstance(changes, Mapping) else ""
+    differs = describe_differences(summary["differs"])
     return f"{summary['scenario'] or 'Run'}: {summary['observer']}{place}, seed {summary['seed']}{world}{differs}"
 
 
@@ -197,9 +186,9 @@ def class_list(kind: UserClassKind) -> str:
     return "\n".join(lines)
 
 
-def lines(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Join a title, and rows of a label and a text."""
-    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows)])
+def lines(title: str, rows: Iterable[tuple[str, Any]]) -> str:
+    """Join a title, and rows of a label and a text; rows without a text are left out."""
+    return "\n".join([title, *(f"  {label:10}  {text}" for label, text in rows if text)])
 
 
 def assignments(values: Mapping[str, TomlValue]) -> str:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.results.summary_keys import NESTED, Summary, SummaryValue, as_table, open_loop_figures
+from cmg_mj.results.intervals import finite_values
+from cmg_mj.results.summary_keys import NESTED, Summary, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
 
 if TYPE_CHECKING:
@@ -94,23 +95,27 @@ class Result(NamedColumns):
         Raises:
             InputError: There is no such key or estimator.
         """
-        summaries: Sequence[Mapping[str, SummaryValue]] = self.summaries
-        if estimator is not None:
-            others = self._open_loop_names
-            if estimator not in others:
-                raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, others)}")
-            summaries = [open_loop_figures(summary).get(estimator, {}) for summary in summaries]
-        known = dict.fromkeys(name for summary in summaries for name in summary)
+        others = self._open_loop_names
+        if estimator is not None and estimator not in others:
+            raise InputError(f"{estimator!r}: no open-loop observer of this run; {nearest(estimator, others)}")
+        known = {name for summary in self._summaries(estimator) for name in summary}
         if key not in known:
             raise InputError(f"{key!r}: not in the summary; {nearest(key, known)}")
-        figures = [summary.get(key) for summary in summaries]
-        numbers = np.array([math.nan if figure is None else figure for figure in figures], dtype=float)
-        return np.where(self.stood, numbers, math.nan)
+        return np.where(self.stood, self.until_end(key, estimator), math.nan)
+
+    def until_end(self, key: str, estimator: str | None = None) -> np.ndarray:
+        """Return what `values` does, but of every world until its end, and NaN where there is no such number."""
+        return np.array([summary.get(key) for summary in self._summaries(estimator)], dtype=float)  # None becomes NaN
+
+    def _summaries(self, estimator: str | None) -> Sequence[Summary]:
+        """Return the numbers of one estimator in every world; none in a world that lacks a floor."""
+        if estimator is None:
+            return self.summaries
+        return [{**open_loop_figures(summary).get(estimator, {})} for summary in self.summaries]
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Return the mean of `values` over the worlds that have one; None if no world has."""
-        values = self.values(key, estimator)
-        known = values[np.isfinite(values)]
+        known = finite_values(self.values(key, estimator))
         return statistics.fmean(known) if len(known) else None
 
     @property
@@ -141,8 +146,7 @@ class Result(NamedColumns):
                 "reason": outcome.reason or None,
                 **{key: value for key, value in figures.items() if key not in NESTED},
             }
-            for world, outcome, summary in zip(worlds, self.outcomes, self.summaries, strict=True)
-            for figures in [open_loop_figures(summary).get(estimator, {}) if estimator else summary]
+            for world, outcome, figures in zip(worlds, self.outcomes, self._summaries(estimator), strict=True)
         ]
 
     def table(self) -> pa.Table:
@@ -164,12 +168,10 @@ class Result(NamedColumns):
         return frame_of(self.table())
 
     @cached_property
-    def _table_columns(self) -> Mapping[str, np.ndarray]:
+    def columns(self) -> Mapping[str, np.ndarray]:
+        """The columns of `table`."""
         table = self.table()
         return {name: table[name].to_numpy() for name in table.column_names}
-
-    def _columns(self) -> Mapping[str, np.ndarray]:
-        return self._table_columns
 
     def split(self, count: int) -> list[Result]:
         """Split the worlds into groups of equal size, in the order in which `run_many` was given them.

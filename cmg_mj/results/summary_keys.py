@@ -79,14 +79,9 @@ def heading(key: str) -> str:
     return KEYS[key].heading
 
 
-def format_figure(key: str, value: SummaryValue) -> str:
-    """Format a summary's number for a table; a dash where there is none."""
-    return "-" if value is None else KEYS[key].pattern.format(value)
-
-
-def format_difference(key: str, value: SummaryValue) -> str:
-    """Format a difference of two numbers for a table, with its sign."""
-    return "-" if value is None else KEYS[key].pattern.replace("{:", "{:+").format(value)
+def format_figure(key: str, value: SummaryValue, sign: str = "") -> str:
+    """Format a summary's number for a table; a dash where there is none. With the sign "+", it always has one."""
+    return "-" if value is None else KEYS[key].pattern.replace("{:", "{:" + sign).format(value)
 
 
 def capitalised(text: str) -> str:
@@ -103,11 +98,9 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def section(summary: Mapping[str, SummaryValue], name: str) -> dict[str, Mapping[str, SummaryValue]]:
+def section(summary: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:
     """Return the summaries that a part of a summary holds, by name; none where there is no such part."""
-    part = summary.get(name)
-    pairs: Iterable[tuple[str, SummaryValue]] = part.items() if isinstance(part, Mapping) else ()
-    return {key: value for key, value in pairs if isinstance(value, Mapping)}
+    return {**summary.get(name, {})}
 
 
 def open_loop_figures(summary: Mapping[str, SummaryValue]) -> dict[str, Mapping[str, SummaryValue]]:
@@ -133,17 +126,15 @@ def combine_axes(axes: Mapping[str, Summary]) -> Summary:
 def _worst(summaries: Sequence[Mapping[str, SummaryValue]]) -> Summary:
     worst: Summary = {}
     for key in summaries[0]:
-        values = [summary[key] for summary in summaries if key in summary]
+        values: list[Any] = [summary[key] for summary in summaries if key in summary]
         if len(values) < len(summaries):  # the axes' observers differ
             continue
-        parts = [value for value in values if isinstance(value, Mapping)]
-        numbers = [value for value in values if isinstance(value, (int, float))]
-        if parts:
-            worst[key] = _worst(parts)
-        elif len(numbers) < len(values):
+        if isinstance(values[0], Mapping):
+            worst[key] = _worst(values)
+        elif None in values:
             worst[key] = None
         else:
-            worst[key] = min(numbers) if key in KEYS and KEYS[key].better == "more" else max(numbers, key=abs)
+            worst[key] = min(values) if key in KEYS and KEYS[key].better == "more" else max(values, key=abs)
     return worst
 
 
@@ -170,4 +161,4 @@ def as_table(rows: Iterable[Summary]) -> pa.Table:
     worlds = list(rows)
     figures = dict.fromkeys(key for row in worlds for key in row if key not in ID_COLUMNS)
     schema = pa.schema([*ID_COLUMNS.items(), *((key, "float64") for key in figures)])
-    return pa.table({name: [row.get(name) for row in worlds] for name in schema.names}, schema=schema)
+    return pa.Table.from_pylist(worlds, schema=schema)

@@ -6,10 +6,9 @@ import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cmg_mj.results.intervals import in_line
-from cmg_mj.results.summary_keys import SummaryValue
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 HEADING_WIDTH = 8
 """Characters of a heading in the terminal before it is broken."""
 
-Row = Mapping[str, SummaryValue]
+Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)

@@ -118,25 +118,24 @@ def frame_of(table: pa.Table) -> pd.DataFrame:
 class NamedColumns:
     """Columns by name, with the conventions of a pandas frame: iteration gives names, `len` counts rows."""
 
-    def _columns(self) -> Mapping[str, np.ndarray]:
-        """Return the columns, in order."""
-        raise NotImplementedError
+    columns: Any
+    """Name -> column, in order."""
 
     def keys(self) -> list[str]:
         """List the columns' names, in order; with it `dict(...)` takes all columns."""
-        return list(self._columns())
+        return list(self)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._columns())
+        return iter(self.columns)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._columns()
+        return name in self.columns
 
     def __getitem__(self, name: str) -> np.ndarray:
-        return self._columns()[name]
+        return self.columns[name]
 
     def __len__(self) -> int:
-        return len(next(iter(self._columns().values())))
+        return len(next(iter(self.columns.values())))
 
 
 @dataclass(frozen=True)
@@ -156,9 +155,6 @@ class Trajectory(NamedColumns):
     columns: Mapping[str, np.ndarray]
     metadata: Mapping[str, Any] = field(default_factory=dict)
     layout: Layout = Layout((), (), ())
-
-    def _columns(self) -> Mapping[str, np.ndarray]:
-        return self.columns
 
     @property
     def observers(self) -> tuple[str, ...]:
@@ -193,13 +189,10 @@ class Trajectory(NamedColumns):
         """
         if axis not in self.axes:
             raise InputError(f"axis {axis!r}: {nearest(axis, self.axes)}")
-        layout = replace(
-            self.layout.axes[self.axes.index(axis)], joints=self.layout.joints, kinds=self.layout.kinds, name=""
-        )
-        names = {"time_s": "time_s"}
-        for name in layout.columns():
-            names[name] = name if name in self.columns else f"{axis}/{name}"
-        return replace(self, columns={new: self.columns[name] for new, name in names.items()}, layout=layout)
+        part = self.layout.axes[self.axes.index(axis)]
+        layout = replace(part, joints=self.layout.joints, kinds=self.layout.kinds, name="")
+        known = {name.removeprefix(f"{axis}/"): values for name, values in self.columns.items()}
+        return replace(self, columns={name: known[name] for name in ("time_s", *layout.columns())}, layout=layout)
 
     @staticmethod
     def joined(axes: Mapping[str, Trajectory]) -> Trajectory:
@@ -209,11 +202,9 @@ class Trajectory(NamedColumns):
             return first
         parts = tuple(replace(axis.layout, joints=(), kinds=(), name=name) for name, axis in axes.items())
         layout = replace(first.layout, axes=parts)
-        columns = {"time_s": first["time_s"]}
-        for part, axis in zip(parts, axes.values(), strict=True):
-            columns |= {f"{part.name}/{name}": axis[name] for name in part.columns()}
-        columns |= {name: first[name] for name in (*layout.positions(), *layout.rates())}
-        return Trajectory(columns, layout=layout)
+        known = {f"{name}/{column}": axis[column] for name, axis in axes.items() for column in axis}
+        known |= first.columns
+        return Trajectory({name: known[name] for name in ("time_s", *layout.columns())}, layout=layout)
 
     def qpos(self, ticks: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Stack the joint positions as MuJoCo has them, (n_ticks, nq) [rad, m, quaternions w, x, y, z]."""
@@ -221,7 +212,7 @@ class Trajectory(NamedColumns):
 
     def world(self, index: int) -> Trajectory:
         """Select one world of many, up to its end."""
-        alone, first = self.of_worlds(index), self.layout.columns()[0] if self.axes else SIGNALS[0]
+        alone, first = self.of_worlds(index), self.keys()[1]
         return alone._rows(np.isfinite(alone[first]))  # NaN after the world's end
 
     def of_worlds(self, worlds: np.ndarray | slice | int) -> Trajectory:
@@ -248,10 +239,10 @@ class Trajectory(NamedColumns):
         """
         import pyarrow as pa
 
-        columns = dict(self.columns)
-        of_many = [values for values in columns.values() if values.ndim == 2]
-        if of_many:
-            worlds = [self.world(index) for index in range(of_many[0].shape[1])]
+        columns = self.columns
+        *_, last = columns.values()
+        if last.ndim == 2:
+            worlds = [self.world(index) for index in range(last.shape[1])]
             number = np.repeat(np.arange(len(worlds)), [len(world) for world in worlds])
             columns = {"world": number, **{name: np.concatenate([world[name] for world in worlds]) for name in self}}
         return frame_of(pa.table(columns))
@@ -281,16 +272,11 @@ class Trajectory(NamedColumns):
         try:
             with open(path, "rb") as file:
                 table = pq.read_table(file)
-        except (OSError, pa.ArrowException) as error:
-            raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
-        text = (table.schema.metadata or {}).get(METADATA_KEY)
-        if text is None or "time_s" not in table.column_names:
-            raise InputError(f"{path}: a Parquet file, but not a trajectory written by cmg-mj")
-        try:
-            stored = json.loads(text)
+            stored = json.loads(table.schema.metadata[METADATA_KEY])
             layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
+        except (OSError, pa.ArrowException, ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
-                f"{path}: a trajectory, but of an earlier version of cmg-mj; run its scenario.toml again"
+                f"{path}: not a trajectory, or of an earlier version of cmg-mj, then run its scenario.toml again: "
+                f"{' '.join(str(error).split())}"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)

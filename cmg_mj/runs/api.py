@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from cmg_mj.core.errors import InputError
@@ -22,37 +21,25 @@ WORLDS = 20
 """Worlds an observer by default."""
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(dict[str, ComparedObserver]):
     """Observers on the same plant, pushes and noise, by name: `comparison["gyro_free"]`.
 
-    Attributes:
-        observers: Name -> the observer's experiment, the result of all worlds, and world 0 with its trajectory.
+    Each has the observer's experiment, the result of all worlds, and world 0 with its trajectory.
     """
 
-    observers: Mapping[str, ComparedObserver]
-
-    def keys(self) -> list[str]:
-        """List the observers' names, in the order given."""
-        return list(self.observers)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.observers)
-
-    def __len__(self) -> int:
-        return len(self.observers)
-
-    def __getitem__(self, name: str) -> ComparedObserver:
-        return self.observers[name]
+    @property
+    def observers(self) -> Mapping[str, ComparedObserver]:
+        """Name -> observer: the comparison itself."""
+        return self
 
     @property
     def summaries(self) -> list[Summary]:
         """Summaries of the observers, then the baselines: means over the worlds, with 95 % intervals."""
-        return standings(list(self.observers.values()))
+        return standings(list(self.values()))
 
     def table(self) -> pa.Table:
         """Make a table with a row per observer and world, then the baselines' rows: columns as in `Result.table`."""
-        return worlds_table(list(self.observers.values()))
+        return worlds_table(list(self.values()))
 
     def to_pandas(self) -> pd.DataFrame:
         """Make a pandas frame of `table`.
@@ -79,8 +66,6 @@ def compare(scenario: Scenario | str, observers: Sequence[str], worlds: int = WO
     """
     if isinstance(observers, str) or not observers or len(set(observers)) < len(observers):
         raise InputError(f"observers = {observers!r}: must be a list of different names")
-    if worlds < 1:
-        raise InputError(f"worlds = {worlds}: must be at least 1")
     base = load_scenario(scenario) if isinstance(scenario, str) else scenario
     compared = comparison.compare(comparison.prepare_comparison(base, observers), worlds)
     return Comparison({entry.kind: entry for entry in compared})

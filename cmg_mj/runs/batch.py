@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import re
 from collections import namedtuple
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import KnownPlant
-from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import State, extra_signals
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
@@ -24,174 +23,83 @@ from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.sensors import Sensors
-from cmg_mj.stages.backlash import backlash
 
 T = TypeVar("T")
 BATCHED_FIELDS = marked_fields(Scenario, Batched)
 """Fields that worlds of one batch may differ in. Every other decides what is computed, or when."""
-UNUSED = frozenset(marked_fields(Scenario, NoEffect))
+UNUSED = marked_fields(Scenario, NoEffect)
 """Fields on which no number of a run depends."""
 
 
-class KeyField(NamedTuple):
-    """One of the things that worlds of one batch have in common.
+BatchKey: TypeAlias = tuple[tuple[str, bool, Hashable], ...]
+"""All that worlds of one batch have in common: what it is in words, whether it is the observer's alone, its value.
 
-    Attributes:
-        words: A field of the scenario, or the part in words.
-        axis: The axis, of several.
-        is_of_observer: Whether the part changes neither the physics nor the sensors nor the law.
-    """
-
-    words: str
-    axis: str
-    is_of_observer: bool = False
-
-    def __str__(self) -> str:
-        return f"axes.{self.axis}.{self.words}" if self.axis else self.words
+Worlds with equal keys can run together; those whose keys differ in the observer's parts, with an observer of their own.
+"""
 
 
-@dataclass(frozen=True)
-class BatchKey:
-    """All that worlds of one batch have in common: worlds with equal keys can run together."""
-
-    parts: tuple[tuple[KeyField, Hashable], ...]
-
-    def first_difference(self, other: BatchKey) -> KeyField | None:
-        """Return the first part in which two keys differ."""
-        a, b = dict(self.parts), dict(other.parts)
-        return next((part for part in (*a, *b) if a.get(part) != b.get(part)), None)
-
-    def without_observer(self) -> BatchKey:
-        """Return the key of worlds that may also differ in their observer."""
-        return BatchKey(tuple((part, value) for part, value in self.parts if not part.is_of_observer))
+def plant_structure(plant: Plant) -> Hashable:
+    """Find what a plant has in common with all that may run with it."""
+    options = plant.model.opt
+    return options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds
 
 
-class PlantStructure(NamedTuple):
-    """Common properties of the plants of one batch."""
-
-    timestep: float
-    integrator: int
-    joints: tuple[str, ...]
-    joint_kinds: tuple[str, ...]
-
-
-class AxisPart(NamedTuple):
-    """An axis of an experiment."""
-
-    scenario: Scenario
-    design: Design
-    axis: str
-    """Name of the axis; empty on a plant of one axis."""
-
-
-def batch_key(parts: Sequence[AxisPart]) -> BatchKey:
-    """Find what worlds of an experiment, given by its axes, have in common with all that may run with them."""
-    return BatchKey(tuple(part for axis_part in parts for part in _key_parts(*axis_part)))
-
-
-def _key_parts(scenario: Scenario, design: Design, axis: str) -> Iterator[tuple[KeyField, Hashable]]:
-    law = scenario.controller.kind
+def key_parts(scenario: Scenario, design: Design, prefix: str = "") -> Iterator[tuple[str, bool, Hashable]]:
+    """Find what worlds of an axis' experiment have in common with all that may run with them; prefix names the axis."""
+    law, observer = scenario.controller.kind, scenario.observer.kind
     for field, value in _leaves(scenario.as_fields()):
-        if field.partition(".")[0] not in UNUSED and not can_vary_in_batch(field, law):
-            yield KeyField(field, axis, field.partition(".")[0] == "observer"), hashable(value)
+        section = field.partition(".")[0]
+        if section not in UNUSED and not can_vary_in_batch(field, law):
+            yield prefix + field, section == "observer", repr(value)  # by which 1, 1.0 and true are different
     _, model, noise = design.constructor_arguments
-    yield KeyField("the reduced model", axis), model
-    observer = scenario.observer.kind
+    yield f"{prefix}the reduced model", False, model
     if "noise" in OBSERVER_CLASSES.takes(observer):
-        yield KeyField(f"the sensors' noise, which {observer} is told,", axis, is_of_observer=True), noise
+        yield f"{prefix}the sensors' noise, which {observer} is told,", True, noise
     if "noise" in LAW_CLASSES.takes(law):
-        yield KeyField("the noise that the law is told", axis), noise
+        yield f"{prefix}the noise that the law is told", False, noise
 
 
 def _leaves(fields: Any, at: str = "") -> Iterator[tuple[str, Any]]:
-    if isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
-        fields = {str(i): part for i, part in enumerate(fields)}
-    if not isinstance(fields, Mapping):
+    if isinstance(fields, Mapping):
+        parts: Any = fields.items()
+    elif isinstance(fields, list) and fields and isinstance(fields[0], Mapping):
+        parts = enumerate(fields)
+    else:
         yield at, fields
         return
-    for name, value in fields.items():
+    for name, value in parts:
         yield from _leaves(value, f"{at}.{name}" if at else name)
-
-
-def hashable(value: Any) -> Hashable:
-    """Return a value of a field as a key, by which 1, 1.0 and true are different."""
-    if isinstance(value, Mapping):
-        return tuple((name, hashable(item)) for name, item in value.items())
-    if isinstance(value, (list, tuple)):
-        return tuple(map(hashable, value))
-    return type(value), value if isinstance(value, Hashable) else repr(value)
 
 
 def can_vary_in_batch(field: str, law: str) -> bool:
     """Return whether worlds of one batch may differ in a field, under a law of this kind."""
-    parts = [part for part in field.split(".") if not part.isdecimal()]
-    names = [".".join(parts[: i + 1]) for i in range(len(parts))]
-    mark = next((BATCHED_FIELDS[name] for name in names if name in BATCHED_FIELDS), None)
+    name = re.sub(r"\.\d+", "", field)
+    mark = next((mark for batched, mark in BATCHED_FIELDS.items() if f"{name}.".startswith(f"{batched}.")), None)
     if mark is None or mark.law_field is None:
         return mark is not None
     return mark.law_field in getattr(LAW_CLASSES.find(law), "arrays", ())
-
-
-def varied_settings(vary: Mapping[str, Sequence[Any] | np.ndarray], scenario: Scenario) -> list[dict[str, Any]]:
-    """Read the settings of each world: see `Experiment.with_varied`.
-
-    Raises:
-        InputError: There is no such field, or the lists differ in length.
-    """
-    lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
-    if not lists or any(isinstance(values, str) or not isinstance(values, Sequence) for values in lists):
-        raise InputError('vary: must be lists of values by field, such as {"equilibrium_bias_deg": [0.0, 0.5]}')
-    if len({len(values) for values in lists}) > 1:
-        raise InputError(f"vary: {', '.join(vary)} must have as many values each, one a world")
-    of_plant = {field.name for field in dataclasses.fields(scenario.plant)}
-    for name in vary:
-        if "." not in name and name not in of_plant and name not in Scenario.model_fields:
-            raise InputError(f"vary: {name!r}: no field of [plant]; {nearest(name, of_plant)}")
-    names = [f"plant.{name}" if name in of_plant else name for name in vary]
-    return [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
-
-
-def plant_structure(plant: Plant) -> PlantStructure:
-    """Find what a plant has in common with all that may run with it."""
-    options = plant.model.opt
-    return PlantStructure(options.timestep, int(options.integrator), tuple(plant.joint_names), plant.joint_kinds)
-
-
-def stack_known_plants(plant: Plant, plants: Sequence[Plant], axis: int) -> KnownPlant:
-    """Combine the properties that a controller of many worlds knows of an axis.
-
-    Args:
-        plant: The plant with that axis alone.
-        plants: The plant of each world.
-        axis: The number of the axis.
-    """
-    tilt = stack_worlds([world_plant.axes[axis].radial_tilt for world_plant in plants])
-    gap = stack_worlds([world_plant.backlash for world_plant in plants])
-    return plant.interface._replace(tilt=tilt, servos=backlash(gap))
-
-
-def require_same_structure(plants: Sequence[Plant], worlds: int, scenario_plant: Plant | None = None) -> None:
-    """Refuse plants that cannot run in one batch, or of which there is not one a world."""
-    if not plants or len(plants) != worlds:
-        raise InputError(f"run_many: {worlds} worlds and {len(plants)} plants; give at least one, and as many of each")
-    different = {*plants, *([scenario_plant] if scenario_plant else [])}
-    if len({plant_structure(plant) for plant in different}) > 1:
-        raise InputError(
-            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
-        )
 
 
 def batched(worlds: Sequence[tuple[Law, Scenario]]) -> tuple[Law, Sensors, Outsides]:
     """Law, sensors and what acts from outside of many worlds as one, with arrays (n_worlds,) where they differ.
 
     Args:
-        worlds: The law and the scenario of each.
+        worlds: The law and the scenario of each. The laws differ in their array fields alone.
     """
     laws, scenarios = zip(*worlds, strict=True)
+    arrays = getattr(laws[0], "arrays", ())
+    law = copy.copy(laws[0]) if arrays else laws[0]
+    for name in arrays:
+        object.__setattr__(law, name, stack_worlds([getattr(world_law, name) for world_law in laws]))
     acting = [outsides(scenario) for scenario in scenarios]
     outside = {name: stack_worlds([world[name] for world in acting]) for name in acting[0]}
-    sensors = stack_worlds([scenario.sensors for scenario in scenarios])
-    return _batched_law(laws), sensors, outside
+    return law, stack_worlds([scenario.sensors for scenario in scenarios]), outside
+
+
+def neighbours(worlds: Sequence[int]) -> list[slice]:
+    """Find the places in a batch of groups of so many worlds, one beside the other."""
+    ends = np.cumsum(worlds).tolist()
+    return [slice(end - count, end) for end, count in zip(ends, worlds, strict=True)]
 
 
 class BatchedObservers:
@@ -204,11 +112,8 @@ class BatchedObservers:
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
         self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
-        ends = np.cumsum([worlds for _, worlds in parts]).tolist()
-        self._parts = [
-            (observer, slice(end - worlds, end)) for (observer, worlds), end in zip(parts, ends, strict=True)
-        ]
-        self._shapes = [(worlds,) for _, worlds in parts]
+        observers, worlds = zip(*parts, strict=True)
+        self._parts = list(zip(observers, neighbours(worlds), strict=True))
 
     def init(self, y: Measurement) -> list[State]:
         """Return each observer's state at the first sample."""
@@ -216,22 +121,18 @@ class BatchedObservers:
 
     def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
         """Advance each by one sample period; estimates are arrays (n_worlds,)."""
-        steps = [
-            observer.step(observer_state, _measurement(y, worlds), u[worlds])
-            for observer_state, (observer, worlds) in zip(state, self._parts, strict=True)
-        ]
-        estimates = [
-            [np.broadcast_to(part, shape) for part in estimate]
-            for (_, estimate), shape in zip(steps, self._shapes, strict=True)
-        ]
-        whole = self._estimate(*(np.concatenate(parts) for parts in zip(*estimates, strict=True)))
-        return [observer_state for observer_state, _ in steps], whole
+        states, estimates = [], []
+        for observer_state, (observer, worlds) in zip(state, self._parts, strict=True):
+            held = u[worlds]
+            observer_state, estimate = observer.step(observer_state, _measurement(y, worlds), held)
+            states.append(observer_state)
+            estimates.append([np.broadcast_to(part, held.shape) for part in estimate])
+        return states, self._estimate(*map(np.concatenate, zip(*estimates, strict=True)))
 
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:
     """Take the measurement of some of the worlds."""
-    y1, y2 = y
-    return Measurement(y1[worlds], y2[worlds], y.acceleration[worlds])  # type: ignore[index]
+    return Measurement(y.y1[worlds], y.y2[worlds], y.acceleration[worlds])  # type: ignore[index]
 
 
 def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer]:
@@ -255,28 +156,6 @@ def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer
     }
 
 
-def unique(items: Sequence[T]) -> list[T]:
-    """Return each of some things once."""
-    return list({id(item): item for item in items}.values())
-
-
-def _batched_law(laws: Sequence[Law]) -> Law:
-    """Return one law for a law of each world; the laws differ in their array fields alone."""
-    law = laws[0]
-    arrays = {
-        name: stack_worlds([getattr(world_law, name) for world_law in laws]) for name in getattr(law, "arrays", ())
-    }
-    if all(values is getattr(law, name) for name, values in arrays.items()):
-        return law
-    batched = copy.copy(law)
-    for name, values in arrays.items():
-        object.__setattr__(batched, name, values)
-    return batched
-
-
-T = TypeVar("T")
-
-
 def stack_worlds(values: Sequence[T]) -> T:
     """Stack the values of the worlds into one value.
 
@@ -293,24 +172,13 @@ def stack_worlds(values: Sequence[T]) -> T:
     if all(value is first or value == first for value in values):
         return first
     if dataclasses.is_dataclass(first):
-        fields = {}
-        for field in dataclasses.fields(first):
-            try:
-                fields[field.name] = stack_worlds([getattr(value, field.name) for value in values])
-            except InputError as error:
-                raise InputError(f"{field.name}: {error}") from error
-        return _with_fields(type(first), fields)  # type: ignore[return-value]
-    if isinstance(first, tuple) and {len(value) for value in values} == {len(first)}:  # type: ignore[arg-type]
+        names = [field.name for field in dataclasses.fields(first)]
+        return _with_fields(first, {name: stack_worlds([getattr(value, name) for value in values]) for name in names})
+    if isinstance(first, tuple):
         return tuple(map(stack_worlds, zip(*values, strict=True)))  # type: ignore[call-overload,return-value]
     if not all(type(value) in (int, float) for value in values):
         raise InputError("must have one value for all worlds of a batch")
     return np.array(values, dtype=float)  # type: ignore[return-value]
-
-
-def unstack(value: T, worlds: int) -> list[T]:
-    """Return the value of each world, from a value that is stacked or not."""
-    first = world_value(value, 0)
-    return [first] * worlds if first is value else [world_value(value, world) for world in range(worlds)]
 
 
 def world_value(value: T, world: int) -> T:
@@ -326,19 +194,16 @@ def world_value(value: T, world: int) -> T:
     if isinstance(value, np.ndarray):
         return value[world].item()
     if isinstance(value, tuple):
-        parts = tuple(world_value(part, world) for part in value)
-        return value if all(a is b for a, b in zip(parts, value, strict=True)) else parts  # type: ignore[return-value]
+        return tuple(world_value(part, world) for part in value)  # type: ignore[return-value]
     if not dataclasses.is_dataclass(value):
         return value
-    parts = {field.name: world_value(getattr(value, field.name), world) for field in dataclasses.fields(value)}
-    if all(part is getattr(value, name) for name, part in parts.items()):
-        return value
-    return _with_fields(type(value), parts)
+    fields = dataclasses.fields(value)
+    return _with_fields(value, {field.name: world_value(getattr(value, field.name), world) for field in fields})
 
 
-def _with_fields(cls: type[T], fields: Mapping[str, Any]) -> T:
-    """Make a frozen dataclass without checking its fields anew."""
-    instance = object.__new__(cls)
+def _with_fields(like: Any, fields: Mapping[str, Any]) -> Any:
+    """Make a frozen dataclass like another without checking its fields anew."""
+    instance = object.__new__(type(like))
     for name, value in fields.items():
         object.__setattr__(instance, name, value)
     return instance

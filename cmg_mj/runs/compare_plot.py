@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -41,7 +40,19 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
     palette = [hexadecimal(colour) for colour in colours(row.name for row in rows).values()]
     stood = [row.entry.result.stood for row in rows]
     for axes, (key, worlds) in zip(grid.flat, drawn.items(), strict=False):
-        _draw(axes, key, worlds, stood, palette)
+        known = np.concatenate(worlds)
+        if np.nanmin(known) > 0.0 and np.nanmax(known) > LOGARITHMIC * np.nanmin(known):
+            axes.set_xscale("log")
+        axes.set_title(KEYS[key].heading, loc="left", fontsize="medium")
+        axes.grid(alpha=0.3, axis="x")
+        for place, (values, upright, color) in enumerate(zip(worlds, stood, palette, strict=True)):
+            across = place + np.linspace(-0.3, 0.3, len(values))
+            axes.scatter(values[upright], across[upright], color=color, alpha=0.6, linewidth=0, s=9)
+            axes.scatter(values[~upright], across[~upright], color="red", linewidth=0.8, marker="x", s=14)
+            interval = known_interval(values[upright], KEYS[key].positive)
+            if interval is not None:
+                axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
+                axes.plot([interval.mean], [place], "|", color="black", markersize=9)
     first = grid.flat[0]
     names = short_names([row.name for row in rows])
     lost = [
@@ -54,22 +65,3 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
     if not np.all(stood):
         heading += " Crosses: worlds that did not stand to the end, until then."
     save_figure(path, figure, heading, dpi=100)
-
-
-def _draw(
-    axes: Any, key: str, rows: Sequence[np.ndarray], all_stood: Sequence[np.ndarray], palette: Sequence[str]
-) -> None:
-    """Draw the panel of one figure."""
-    known = np.concatenate(rows)
-    if np.nanmin(known) > 0.0 and np.nanmax(known) > LOGARITHMIC * np.nanmin(known):
-        axes.set_xscale("log")
-    axes.set_title(KEYS[key].heading, loc="left", fontsize="medium")
-    axes.grid(alpha=0.3, axis="x")
-    for place, (figures, stood, color) in enumerate(zip(rows, all_stood, palette, strict=True)):
-        across = place + np.linspace(-0.3, 0.3, len(figures))
-        axes.scatter(figures[stood], across[stood], color=color, alpha=0.6, linewidth=0, s=9)
-        axes.scatter(figures[~stood], across[~stood], color="red", linewidth=0.8, marker="x", s=14)
-        interval = known_interval(figures[stood], KEYS[key].positive)
-        if interval is not None:
-            axes.plot([interval.low, interval.high], [place, place], color="black", linewidth=2.0)
-            axes.plot([interval.mean], [place], "|", color="black", markersize=9)

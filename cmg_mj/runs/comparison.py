@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,17 +116,18 @@ def compare(
         One entry an observer; fewer if the user interrupted, and those there are complete.
     """
     compared = []
+
+    def report(done: int, duration: float, time: float) -> None:
+        if on_progress:
+            on_progress((done + time / duration) / len(experiments))
+
     for i, experiment in enumerate(experiments):
-        duration = experiment.scenario.duration_s
-
-        def report(time: float, done: int = i, duration: float = duration) -> None:
-            if on_progress:
-                on_progress((done + time / duration) / len(experiments))
-
-        result = experiment.run_many(worlds, keep_trajectory=False, on_progress=report)
+        result = experiment.run_many(
+            worlds, keep_trajectory=False, on_progress=partial(report, i, experiment.scenario.duration_s)
+        )
         if any(outcome.kind == "interrupted" for outcome in result.outcomes):
             break
-        world_0 = experiment.run(on_progress=lambda time, report=report, end=duration: report(end))
+        world_0 = experiment.run(on_progress=partial(report, i + 1, math.inf))
         if world_0.outcomes[0].kind == "interrupted":
             break
         compared.append(ComparedObserver(experiment, result, world_0))
@@ -145,7 +148,7 @@ def repeatable(scenario: Scenario, experiments: Sequence[Experiment], worlds: in
     """
     same = [e for e in experiments if e.scenario.observer.kind == scenario.observer.kind]
     trimmed = [e for e in experiments if e.scenario.controller.bias_trim_s]
-    choice = (same or trimmed or list(experiments))[0]
+    choice, *_ = *same, *trimmed, *experiments
     settings = CompareSettings(observers=[e.scenario.observer.kind for e in experiments], worlds=worlds)
     changes = {"compare": settings, "controller": (trimmed or [choice])[0].scenario.controller}
     return replace(choice, scenario=choice.scenario.model_copy(update=changes))
@@ -173,8 +176,7 @@ class ComparisonRow:
 
     def figures(self, key: str) -> np.ndarray:
         """Return a figure of every world, until its end, (n_worlds,); NaN where there is none."""
-        figures = [world.get(key) for world in self.entry.result.rows(self.reference)]
-        return np.array([np.nan if figure is None else figure for figure in figures], dtype=float)
+        return self.entry.result.until_end(key, self.reference)
 
     def values(self, key: str) -> np.ndarray:
         """Return a figure of every world, (n_worlds,); NaN where a world did not stand or has no such figure."""
@@ -202,11 +204,11 @@ class ComparisonRow:
 def best_observer(compared: Sequence[ComparedObserver], key: str) -> ComparedObserver | None:
     """Find the observer with the best mean of a figure, among those that stood in the most worlds."""
     most = max(entry.result.stood.sum() for entry in compared)
-    sign = -1.0 if KEYS[key].better == "more" else 1.0
     candidates = [entry for entry in compared if entry.result.stood.sum() == most]
     means = [(finite_mean(ComparisonRow(entry).values(key)), entry) for entry in candidates]
-    known = [(sign * mean, entry) for mean, entry in means if mean is not None]
-    return min(known, key=lambda pair: pair[0])[1] if known else None
+    known = [(mean, entry) for mean, entry in means if mean is not None]
+    pick = max if KEYS[key].better == "more" else min
+    return pick(known, key=lambda pair: pair[0])[1] if known else None
 
 
 def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]:
@@ -230,14 +232,18 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
         For each row its means; `intervals`: key -> ends of the mean's 95 % interval; `minus_best`: key -> the
         difference to the best observer in this figure, over the worlds in which both have it, with its interval.
     """
-    rows = comparison_rows(compared)
     keys = dict.fromkeys(key for entry in compared for key in entry.result.summaries[0] if key in KEYS)
     best = {key: best_observer(compared, key) for key in keys if KEYS[key].better}
     leaders = {key: ComparisonRow(observer) for key, observer in best.items() if observer}
     standing = []
-    for row in rows:
+    for row in comparison_rows(compared):
         intervals = {key: _ends(row.values(key), KEYS[key].positive) for key in keys}
-        minus_best = {key: _paired_difference(row, leader, key) for key, leader in leaders.items() if row != leader}
+        minus_best = {}
+        for key, leader in leaders.items():
+            if row != leader:
+                less = row.values(key) - leader.values(key)  # world by world
+                mean, worlds = finite_mean(less), len(finite_values(less))
+                minus_best[key] = {"best": leader.name, "worlds": worlds, "mean": mean, "interval": _ends(less)}
         standing.append(finite(row.summary | {"intervals": intervals, "minus_best": minus_best}))
     return standing
 
@@ -250,14 +256,3 @@ def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
 def _ends(values: np.ndarray, positive: bool = False) -> list[float] | None:
     interval = known_interval(values, positive)
     return None if interval is None else [interval.low, interval.high]
-
-
-def _paired_difference(row: ComparisonRow, leader: ComparisonRow, key: str) -> Summary:
-    """Compare a figure with the best observer's, world by world."""
-    differences = row.values(key) - leader.values(key)
-    return {
-        "best": leader.name,
-        "worlds": len(finite_values(differences)),
-        "mean": finite_mean(differences),
-        "interval": _ends(differences),
-    }

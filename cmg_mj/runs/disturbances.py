@@ -33,9 +33,11 @@ def disturbances(
         seed: The run's seed.
         worlds: The number of one world, or the numbers of many.
     """
-    first, given = plants[0], {name: parts for name, parts in settings.items() if parts}
+    first = plants[0]
     made: list[Disturbance] = [
-        kind(given[name], first.timestep, first.axis_names) for name, kind in TORQUES.items() if name in given
+        kind(settings[name], first.timestep, first.axis_names) for name, kind in TORQUES.items() if settings.get(name)
     ]
-    made += [make(given[name], plants, seed, worlds) for name, make in entries("disturbance").items() if name in given]
+    for name, make in entries("disturbance").items():
+        if settings.get(name):
+            made.append(make(settings[name], plants, seed, worlds))
     return made

@@ -7,6 +7,7 @@ import functools
 import itertools
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -15,33 +16,36 @@ import tomli_w
 
 from cmg_mj.core.axes import ControllerLike, MultiAxisController
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.errors import InputError, nearest, shown
+from cmg_mj.core.errors import InputError, RunStopped, nearest, shown
 from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.features import DRIVERS, entries
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.laws import Law
 from cmg_mj.observers import Observer
+from cmg_mj.plant.mjcf import quiet
+from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant, check_axes, load_scenario_plant
 from cmg_mj.results.folder import whole_file
-from cmg_mj.results.result import Result
+from cmg_mj.results.result import Outcome, Result
+from cmg_mj.results.summary_keys import combine_axes
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.batch import (
-    AxisPart,
     BatchKey,
-    batch_key,
     batched,
     batched_open_loop_observers,
-    hashable,
-    require_same_structure,
-    stack_known_plants,
-    unique,
-    varied_settings,
+    key_parts,
+    plant_structure,
+    stack_worlds,
 )
-from cmg_mj.runs.disturbances import Outsides, outsides
-from cmg_mj.runs.simulate import SimulationOptions, simulate
+from cmg_mj.runs.disturbances import Outsides, disturbances, outsides
+from cmg_mj.runs.recorder import TickRecorder
+from cmg_mj.runs.simulate import SimulationOptions, outcome_of
 from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
+from cmg_mj.stages.backlash import backlash
 
 if TYPE_CHECKING:
     import control
@@ -173,22 +177,15 @@ class Experiment:
         numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
         if vary is not None and plants is not None:
             raise InputError("run_many: give plants or vary, not both")
-        if vary is not None:
-            return run_batch(self.with_varied(vary), numbers, **options)
-        plants = [self.plant] * len(numbers) if plants is None else list(plants)
-        require_same_structure(plants, len(numbers), self.plant)
-        controllers = [
-            part.design.controller(stack_known_plants(part.plant, plants, i), worlds=numbers, axis=i)
-            for i, part in enumerate(self.parts)
-        ]
-        return self.simulate(plants, self.join_axes(controllers), **options)
+        experiments = [self] * len(numbers) if vary is None else self.with_varied(vary)
+        return run_batch(experiments, numbers, plants, **options)
 
-    @property
+    @functools.cached_property
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
-        return batch_key(
-            [AxisPart(part.scenario, part.design, part.plant.axis.name if self.axes else "") for part in self.parts]
-        )
+        prefixes = [f"axes.{axis.plant.axis.name}." for axis in self.axes] or [""]
+        of_axes = [key_parts(part.scenario, part.design, name) for part, name in zip(self.parts, prefixes, strict=True)]
+        return ("the plant's structure", False, plant_structure(self.plant)), *itertools.chain(*of_axes)
 
     @property
     def parts(self) -> tuple[Experiment, ...]:
@@ -207,9 +204,18 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        keyed = [(hashable(row), row) for row in varied_settings(vary, self.scenario)]
-        experiments = {key: self.with_settings(row) for key, row in dict(keyed).items()}
-        return [experiments[key] for key, _ in keyed]
+        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
+        are_lists = all(isinstance(values, Sequence) and not isinstance(values, str) for values in lists)
+        if not are_lists or len({len(values) for values in lists}) != 1:
+            raise InputError(
+                f"vary: {', '.join(vary)}: must be lists of values by field, as many values each, one a world, such as "
+                '{"equilibrium_bias_deg": [0.0, 0.5]}'
+            )
+        of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        names = [f"plant.{name}" if name in of_plant else name for name in vary]
+        rows = [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
+        experiments = {key: self.with_settings(row) for key, row in {repr(row): row for row in rows}.items()}
+        return [experiments[repr(row)] for row in rows]
 
     def with_settings(self, values: Mapping[str, Any]) -> Experiment:
         """Return the experiment with other values of some fields.
@@ -229,6 +235,7 @@ class Experiment:
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
         return prepare(parse_scenario(fields, f"{self.scenario.source} with {settings}".strip()), like=self.plant)
 
+    @quiet()
     def simulate(
         self,
         plant: Plant | Sequence[Plant],
@@ -241,27 +248,86 @@ class Experiment:
         """Run a controller on one rig or several, for the scenario's time and judged by its settings.
 
         Args:
-            plant: The rig, or one a world.
-            controller: A fresh one.
+            plant: The rig; or one a world, which may differ in numbers but not in structure.
+            controller: A fresh one, made for one world or for as many as there are rigs.
             outside: What acts from outside, instead of what the scenario has.
-            driver: Name of what calls the controller.
-            loop: Advances physics and controller.
-            **options: Those of `simulate`.
+            driver: Name of what calls the controller: `native`: the loop, `callback`: MuJoCo (one world only).
+            loop: Advances physics and controller, if it is not these two.
+            **options: See `SimulationOptions`.
 
         Returns:
-            The result.
+            The outcomes, summaries and the trajectory. Whatever stops a run, what was recorded until then is there.
+
+        Raises:
+            InputError: A time or rate does not fit the physics step, or the callback was asked to drive many worlds.
         """
-        scenario = self.scenario
-        return simulate(
-            plant,
-            controller,
-            scenario.duration_s,
-            observers={name: part.observer_names for name, part in zip(self.plant.axis_names, self.parts, strict=True)},
-            outside=outsides(scenario) if outside is None else outside,
-            settings=scenario.metrics,
-            driver=driver,
-            loop=loop,
-            **options,
+        single = isinstance(plant, Plant)
+        plants = [plant] if single else list(plant)
+        if driver != "native" and not single:
+            raise InputError(f"driver = {driver!r}: drives one world, not a batch")
+        settings, keep = self.scenario.metrics, options.get("keep_trajectory", True)
+        outside = outsides(self.scenario) if outside is None else outside
+        acting = disturbances(outside, plants, controller.seed, controller.worlds)
+        if single and any(one.accelerates for one in acting):
+            plants = [plants[0].with_own_model()]
+        timestep, duration_s = plants[0].timestep, self.scenario.duration_s
+        steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
+        recorders = {
+            name: TickRecorder(
+                [rig.single_axis(name) for rig in plants],
+                axis.observer_names,
+                part,
+                outside,
+                settings,
+                keep=keep,
+                joints=axis is self.parts[0],
+            )
+            for name, axis, part in zip(plants[0].axis_names, self.parts, controller.parts, strict=True)
+        }
+
+        def since(tick: int) -> Trajectory:
+            return Trajectory.joined({name: recorder.since(tick) for name, recorder in recorders.items()})
+
+        if on_start := options.get("on_start"):
+            on_start(since)
+        physics = OneWorld(plants[0]) if single else ManyWorlds(plants, options.get("threads", 0))
+        driving: AbstractContextManager = nullcontext()
+        if driver == "callback":
+            from cmg_mj.runs.callback import CallbackLoop, control_callback  # the loop needs no callback of MuJoCo's
+
+            loop, driving = CallbackLoop, control_callback(plants[0], controller)
+        ticks = loop(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
+        rest, on_progress = Outcome("done", duration_s), options.get("on_progress")
+        try:
+            with driving:
+                for tick in ticks.ticks():
+                    ticks.decide()
+                    ticks.advance()
+                    running = None if physics.running is None else physics.running.copy()
+                    for recorder, torque in zip(recorders.values(), tick.torques, strict=True):
+                        recorder.add(tick.q, tick.v, torque, running)
+                    if on_progress:
+                        on_progress((tick.step + tick.steps) * timestep)
+        except RunStopped as error:
+            rest = Outcome("stopped", ticks.step * timestep, str(error), len(plants) > 1)
+        except KeyboardInterrupt:
+            rest = Outcome("interrupted", ticks.step * timestep)
+        for recorder in recorders.values():
+            recorder.flush()
+        endings = ticks.endings
+        outcomes = [outcome_of(endings[world], timestep) if world in endings else rest for world in range(len(plants))]
+        summaries = [
+            combine_axes({name: one.metrics.summary(world, outcome.kind == "done") for name, one in recorders.items()})
+            for world, outcome in enumerate(outcomes)
+        ]
+        return Result(
+            outcomes,
+            summaries,
+            since(0) if keep else None,
+            tuple(self.observer_names),
+            controller.seed,
+            (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds),
+            driver,
         )
 
     def require_single_axis(self, what: str) -> Experiment:
@@ -336,8 +402,8 @@ class Experiment:
         from cmg_mj.linear.verdict import hints  # as above
 
         if not self.axes:
-            of_features = [judge(self.design, self.plant).hints for judge in entries("judge").values()]
-            return [*hints(self.design, self.plant), *itertools.chain(*of_features)]
+            judgements = [judge(self.design, self.plant) for judge in entries("judge").values()]
+            return [*hints(self.design, self.plant), *(hint for judged in judgements for hint in judged.hints)]
         return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
 
     def resolved(self) -> dict[str, Any]:
@@ -368,7 +434,15 @@ class Experiment:
 
     def as_toml(self, driver: str = "native", world: int = 0) -> str:
         """Return the resolved scenario: running it again gives the same run; its head says if that needs options."""
-        return replay_comment(driver, world) + tomli_w.dumps(self.resolved())
+        why, command = "", "cmg-mj run scenario.toml"
+        if driver == "board":
+            why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
+            command += " --driver board"
+        if world:
+            why += f"World {world}: its noise is not that of world 0. "
+            command += f" --world {world}"
+        head = f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
+        return head + tomli_w.dumps(self.resolved())
 
     def save(self, path: Path) -> None:
         """Write it as TOML."""
@@ -407,12 +481,20 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     return first if first.scenario is scenario else Experiment(scenario, plant, first.design, tuple(axes))
 
 
-def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **options: Unpack[SimulationOptions]) -> Result:
+def run_batch(
+    experiments: Sequence[Experiment],
+    worlds: Sequence[int],
+    plants: Sequence[Plant] | None = None,
+    observer: Observer | None = None,
+    **options: Unpack[SimulationOptions],
+) -> Result:
     """Run worlds of different experiments in one batch: every number that differs is an array (n_worlds,).
 
     Args:
         experiments: One a world.
         worlds: The worlds' numbers: world i has the same noise in every experiment.
+        plants: A plant a world, instead of the experiments'.
+        observer: The observer of all worlds instead of the first experiment's; then it is not looked whether they fit.
         **options: Options of `simulate`.
 
     Returns:
@@ -421,61 +503,39 @@ def run_batch(experiments: Sequence[Experiment], worlds: Sequence[int], **option
     Raises:
         InputError: They differ in something that worlds of one batch have in common.
     """
-    require_same_structure([experiment.plant for experiment in experiments], len(worlds))
-    first, *others = unique(experiments)
+    plants = [experiment.plant for experiment in experiments] if plants is None else list(plants)
+    if not plants or len(plants) != len(worlds):
+        raise InputError(
+            f"run_many: {len(worlds)} worlds and {len(plants)} plants; give at least one, and as many of each"
+        )
+    if len({plant_structure(plant) for plant in {*plants, *(experiment.plant for experiment in experiments)}}) > 1:
+        raise InputError(
+            "run_many: the plants must have the scenario's joints and timestep_s, and one integrator in common"
+        )
+    first = experiments[0]
     key = first.batch_key
-    for other in others:
-        part = key.first_difference(other.batch_key)
-        if part:
+    for another in () if observer else (experiment.batch_key for experiment in experiments):
+        if another != key:
+            words = next(part[0] for part in (*key, *another) if part not in key or part not in another)
             raise InputError(
-                f"run_many: {part} differs, which worlds of one batch must have in common; call run_many once for "
+                f"run_many: {words} differs, which worlds of one batch must have in common; call run_many once for "
                 "each value"
             )
-    return first.simulate(*batch_inputs(experiments, worlds), **options)
-
-
-def batch_inputs(
-    experiments: Sequence[Experiment], worlds: Sequence[int], observer: Observer | None = None
-) -> tuple[list[Plant], ControllerLike, Outsides]:
-    """Make the inputs of `Experiment.simulate` for a batch: a plant a world, a controller, what moves all worlds.
-
-    Args:
-        experiments: One a world.
-        worlds: The worlds' numbers.
-        observer: The observer of all worlds instead of the first experiment's.
-    """
-    first, plants = experiments[0], [experiment.plant for experiment in experiments]
     controllers, outside = [], outsides(first.scenario)
     for i, part in enumerate(first.parts):
         parts = [experiment.parts[i] for experiment in experiments]
         law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
-        open_loop = batched_open_loop_observers([one.design for one in parts])
+        tilt = stack_worlds([plant.axes[i].radial_tilt for plant in plants])
+        servos = backlash(stack_worlds([plant.backlash for plant in plants]))
         controllers.append(
             part.design.controller(
-                stack_known_plants(part.plant, plants, i),
+                part.plant.interface._replace(tilt=tilt, servos=servos),
                 worlds=worlds,
                 axis=i,
                 observer=observer,
-                open_loop_observers=open_loop,
+                open_loop_observers=batched_open_loop_observers([one.design for one in parts]),
                 law=law,
                 sensors=sensors,
             )
         )
-    return plants, first.join_axes(controllers), outside
-
-
-def replay_comment(driver: str, world: int) -> str:
-    """Write the head as comments; empty where the scenario alone gives the same run.
-
-    Args:
-        driver: Who calls the controller, or is it.
-        world: Number of the world.
-    """
-    why, command = "", "cmg-mj run scenario.toml"
-    if driver == "board":
-        why += "Run on the emulated board (docs/board.md), whose numbers are not quite the host's. "
-        command += " --driver board"
-    if world:
-        why += f"World {world}: its noise is not that of world 0. "
-        command += f" --world {world}"
-    return f"# {why}To the same numbers it runs with\n#     {command}\n\n" if why else ""
+    return first.simulate(plants, first.join_axes(controllers), outside, **options)

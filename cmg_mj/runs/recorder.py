@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, Tick
+from cmg_mj.core.controller import Controller
 from cmg_mj.plant.physics import Joints
 from cmg_mj.plant.plant import Plant
-from cmg_mj.results.baselines import Baselines
+from cmg_mj.results.baselines import RATES, Baselines
+from cmg_mj.results.floors import TiltFloor, acceleration_floor
 from cmg_mj.results.metrics import Metrics
 from cmg_mj.results.trajectory import Layout, Trajectory
+from cmg_mj.runs.batch import world_value
+from cmg_mj.runs.disturbances import Outsides
+from cmg_mj.scenario.schema import MetricsSettings
 
 TICKS_A_PIECE = 256
 """Ticks that are made into columns together, which is much cheaper than one by one."""
@@ -26,8 +31,8 @@ class TickRecorder:
         plants: The rigs, one a world.
         observers: Names of the observer in the loop, then of the open-loop observers.
         controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
-        metrics: Takes every piece.
-        references: The baselines that give a rate.
+        outside: What acts from outside.
+        settings: What counts as settled.
         keep: Whether to keep the pieces for a trajectory.
         joints: Whether to keep the joints.
     """
@@ -37,38 +42,59 @@ class TickRecorder:
         plants: Sequence[Plant],
         observers: Sequence[str],
         controller: Controller,
-        metrics: Metrics,
-        references: Baselines,
+        outside: Outsides,
+        settings: MetricsSettings,
         *,
         keep: bool,
         joints: bool,
     ) -> None:
-        self._axis = plants[0].axis
+        self._axis, self._controller = plants[0].axis, controller
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
         self._layout = Layout(tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds)
-        self.metrics, self._references = metrics, references
-        self._keep, self._joints, self._dt = keep, joints, controller.law.dt
+        dt, sensors = controller.law.dt, controller.sensors
+        self._keep, self._joints, self._dt = keep, joints, dt
         self._single = isinstance(controller.worlds, int)
         self._waiting: list[tuple] = []
         self._kept = {name: [np.zeros((0, len(plants)))] for name in self._layout.columns()}
+        pairs = [(plant, world_value(sensors, world)) for world, plant in enumerate(plants)]
+        noises = [plant.parameters.noise(sensor) for plant, sensor in pairs]
+        y1_period = max(dt, 1.0 / sensors.accelerometer.rate_hz)
+        unmodelled = any(part.unmodelled for parts in outside.values() for part in parts)
+        acceleration_floors = []
+        for noise, (plant, sensor) in zip(noises, pairs, strict=True):
+            slides = plant.radial_tilt.height != plant.reduced.pivot_arm
+            other = unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends or slides
+            acceleration_floors.append(None if other else acceleration_floor(noise, y1_period))
+        self.metrics = Metrics(
+            observers,
+            len(plants),
+            dt,
+            outside.get("push", ()),
+            controller.law.rate_limit,
+            settings,
+            [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs],
+            RATES,
+            TiltFloor(y1_period, len(plants)),
+            acceleration_floors,
+        )
+        # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
+        sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
+        self._references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.worlds, sigmas, controller.axis)
 
-    def add(
-        self, q: Joints, v: Joints, tick: Tick, body_rate: Scalar, torque: Scalar, running: np.ndarray | None
-    ) -> None:
-        """Take one tick.
+    def add(self, q: Joints, v: Joints, torque: Scalar, running: np.ndarray | None) -> None:
+        """Take the controller's latest tick.
 
         Args:
             q: Joint angles at the tick [rad].
             v: Joint rates at the tick [rad/s].
-            tick: What the controller measured and decided.
-            body_rate: Rate of the frame along the tilt axis, as a perfect gyro on it shows [rad/s].
             torque: The push, a float, or (n_worlds,) [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
+        body_rate = self._controller.body_rate
         if not self._single:  # a row of all sensors' readings, which would be held as long
             body_rate = body_rate.copy()
-        self._waiting.append((q, v, tick, body_rate, torque, running))
+        self._waiting.append((q, v, self._controller.tick, body_rate, torque, running))
         if len(self._waiting) >= TICKS_A_PIECE:
             self.flush()
 

@@ -19,7 +19,6 @@ from cmg_mj.runs.comparison import ComparedObserver, standings, worlds_table
 from cmg_mj.runs.experiment import Experiment
 
 if TYPE_CHECKING:
-    from cmg_mj.runs.live import LiveView
     from cmg_mj.view.recording import RecordingHeader, Run
 
 
@@ -155,7 +154,7 @@ def save_comparison(
     from cmg_mj.view.recording import write_recording
 
     reports = [report_run(entry.experiment, entry.world_0, several=len(observers) > 1) for entry in observers]
-    header = recording_header(reports[0].experiment, reports[0].driver, reports[0].world)
+    header = recording_header(reports[0].experiment)
     names = short_names([entry.kind for entry in observers]).values()
     files: dict[str, Callable[[Path], object]] = {
         **{
@@ -194,13 +193,6 @@ def recording_header(experiment: Experiment, driver: str = "native", world: int 
         rate_limit_rad_s=experiment.law.rate_limit,
         scenario_toml=experiment.as_toml(driver, world),
     )
-
-
-def live_view(experiment: Experiment) -> LiveView:
-    """Start rerun's viewer for a run of an experiment."""
-    from cmg_mj.runs.live import LiveView
-
-    return LiveView(recording_header(experiment), experiment.scenario.observer.kind)
 
 
 def _write_json(path: Path, value: Summary | list[Summary]) -> None:

@@ -7,13 +7,10 @@ from collections.abc import Hashable, Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple, Unpack
 
-import numpy as np
-
 from cmg_mj.core.types import extra_signals
 from cmg_mj.results.result import Result
-from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.runs.batch import BatchedObservers, plant_structure, unique
-from cmg_mj.runs.experiment import Experiment, batch_inputs, run_batch
+from cmg_mj.runs.batch import BatchedObservers, neighbours
+from cmg_mj.runs.experiment import Experiment, run_batch
 from cmg_mj.runs.simulate import SimulationOptions
 
 MAX_WORLDS = 1024
@@ -52,9 +49,7 @@ def run_jobs(runs: Sequence[BatchJob], **options: Unpack[SimulationOptions]) -> 
     """
     results_of_jobs: dict[int, Result] = {}
     for batch in _batches(runs):
-        results: list[Result] = []
-        if len(batch) > 1:
-            results = _run_together([runs[i] for i in batch], options)
+        results = _run_together([runs[i] for i in batch], options) if len(batch) > 1 else []
         if not results or any(outcome.kind == "stopped" for result in results for outcome in result.outcomes):
             # An observer that raises stops all worlds of its batch: what the others do is seen without it.
             results = [run_batch(*runs[i], **options) for i in batch]
@@ -80,11 +75,10 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
 def _shared_key(job: BatchJob) -> Hashable:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
-    if first.axes or len({one.batch_key for one in unique(job.experiments)}) > 1:
+    if first.axes or len({one.batch_key for one in job.experiments}) > 1:
         return None
-    key = first.batch_key.without_observer()
-    names = extra_signals(first.design.observer())
-    return key, plant_structure(first.plant), names, tuple(first.scenario.open_loop_names())
+    key = tuple(part for part in first.batch_key if not part[1])
+    return key, extra_signals(first.design.observer()), tuple(first.scenario.open_loop_names())
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:
@@ -96,12 +90,11 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
         parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
     experiments = [experiment for job in jobs for experiment in job.experiments]
     numbers = [int(number) for job in jobs for number in job.worlds]
-    inputs = batch_inputs(experiments, numbers, observer=BatchedObservers(parts))
-    whole = experiments[0].simulate(*inputs, **options)
-    ends = np.cumsum([len(job.worlds) for job in jobs]).tolist()
+    whole = run_batch(experiments, numbers, observer=BatchedObservers(parts), **options)
+    places = neighbours([len(job.worlds) for job in jobs])
     return [
-        _renamed(whole.select(slice(end - len(job.worlds), end)), job.experiments[0].scenario.observer.kind)
-        for job, end in zip(jobs, ends, strict=True)
+        _renamed(whole.select(place), job.experiments[0].scenario.observer.kind)
+        for job, place in zip(jobs, places, strict=True)
     ]
 
 
@@ -109,12 +102,9 @@ def _renamed(result: Result, observer: str) -> Result:
     """Return a result with the name of the observer that these worlds had."""
     before, *open_loop = result.observers
     trajectory = result.trajectory
-    if trajectory is not None and before != observer:
+    if trajectory is not None:
         old, new = f"estimate/{before}/", f"estimate/{observer}/"
-        columns = {
-            new + name.removeprefix(old) if name.startswith(old) else name: values
-            for name, values in trajectory.columns.items()
-        }
+        columns = {name.replace(old, new): values for name, values in trajectory.columns.items()}
         layout = dataclasses.replace(trajectory.layout, observers=(observer, *open_loop))
-        trajectory = Trajectory(columns, trajectory.metadata, layout)
+        trajectory = dataclasses.replace(trajectory, columns=columns, layout=layout)
     return dataclasses.replace(result, observers=(observer, *open_loop), trajectory=trajectory)

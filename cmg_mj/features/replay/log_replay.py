@@ -88,7 +88,9 @@ class ReplayResult(NamedColumns):
         extra = tuple(tuple(name for name in signals if name not in ESTIMATES) for signals in self.estimates.values())
         return Trajectory(columns, {}, Layout(tuple(self.estimates), extra, ()))
 
-    def _columns(self) -> Mapping[str, np.ndarray]:
+    @cached_property
+    def columns(self) -> Mapping[str, np.ndarray]:
+        """The columns of `trajectory`."""
         return self.trajectory.columns
 
     def to_pandas(self) -> pd.DataFrame:

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import os
+import shutil
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,9 +21,9 @@ import tomli_w
 from cmg_mj.core.errors import InputError, RunStopped, raised
 from cmg_mj.features.sweeps.study import CHUNK, MAX_TRIALS, SweepStudy, Trial, varied_tracks
 from cmg_mj.inputs.files import find, model_files
-from cmg_mj.results.folder import is_own, numbered, remove, whole_file, write_marker
+from cmg_mj.results.folder import is_own, numbered, whole_file, write_marker
 from cmg_mj.results.summary_keys import ID_COLUMNS, KEYS, Summary, SummaryValue
-from cmg_mj.runs.batch import BatchKey, PlantStructure, plant_structure
+from cmg_mj.runs.batch import BatchKey
 from cmg_mj.runs.experiment import Experiment, prepare, run_batch
 
 # --- computed
@@ -60,12 +61,12 @@ def compute(
     """
     base = prepare(study.scenario_with(observer))
     results: dict[Trial, Summary] = {}
-    batches: dict[tuple[BatchKey, PlantStructure], dict[Trial, Experiment]] = {}
+    batches: dict[BatchKey, dict[Trial, Experiment]] = {}
     for number, group in itertools.groupby(trials, key=lambda trial: trial[0]):
         of_point = list(group)
         try:
             experiment = base.with_settings(study.point(number))
-            key = experiment.batch_key, plant_structure(experiment.plant)
+            key = experiment.batch_key
         except InputError as error:  # values that do not fit each other: these trials never begin
             results |= dict.fromkeys(of_point, unfinished("refused", str(error)))
         else:
@@ -356,7 +357,7 @@ def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
         if not any(folder.iterdir()) or there == fields:
             return True
     if overwrite and is_own(folder):
-        remove(folder)
+        shutil.rmtree(folder)
     return not os.path.lexists(folder)
 
 

@@ -23,6 +23,7 @@ from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_obse
 from cmg_mj.observers.parameter_options import parameters_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.save import report_run, save_run
+from tests.command import cmg_mj
 from tests.features.replay.motion import COLUMNS, DT, N, read, sine
 from tests.observers.reference import PAPER
 
@@ -39,6 +40,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     save_run(folder, report_run(experiment, result))
     assert report_run(experiment, result).summary["observer"] == "homogeneous"
     return folder
+
+
+def test_an_axis_cut_out_of_a_run_of_two_is_refused(tmp_path: Path) -> None:
+    experiment = prepare(load_scenario("two_axes", ["duration_s=0.1", "push=[]"]))
+    trajectory = report_run(experiment, experiment.run()).trajectory
+    trajectory.along("pitch").save(tmp_path / "pitch.parquet")
+    assert "tilts about several axes" in cmg_mj("replay", tmp_path / "pitch.parquet").complaint
 
 
 def log(tmp_path: Path, **more: np.ndarray) -> Log:

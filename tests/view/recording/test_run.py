@@ -22,7 +22,8 @@ from cmg_mj.results.summary_keys import KEYS, capitalised, format_figure, headin
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import live
 from cmg_mj.runs.experiment import Experiment, prepare
-from cmg_mj.runs.save import live_view
+from cmg_mj.runs.live import LiveView
+from cmg_mj.runs.save import recording_header
 from cmg_mj.scenario.loading import Scenario, load_scenario
 from cmg_mj.scenario.schema import MetricsSettings
 from cmg_mj.stages.push import Push
@@ -346,7 +347,7 @@ def test_a_viewer_receives_the_run_while_it_goes_on(name: str, tmp_path: Path, m
     monkeypatch.setattr(live.subprocess, "Popen", lambda *_, **__: None)
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", lambda rec: rec.save(path))
     experiment = prepare(load_scenario(name, ["duration_s=0.5", "push=[]"]))
-    view = live_view(experiment)
+    view = LiveView(recording_header(experiment), experiment.scenario.observer.kind)
     result = experiment.run(**view.options(lambda _: None))
     view.show()
     view._rec.disconnect()
