@@ -22,6 +22,7 @@ VERDICTS = {
 """Verdict -> its meaning: the rule of `Claim.verdict` in words."""
 
 Array = np.ndarray
+"""An array of NumPy's."""
 
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""

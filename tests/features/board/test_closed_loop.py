@@ -171,7 +171,9 @@ def test_a_reading_that_is_not_finite_stops_the_board_until_start() -> None:
 
 
 def test_what_the_board_cannot_do_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+    with pytest.raises(
+        InputError, match=r"^controller\.feedback = 'truth': cannot be exported: C has the observer's rate"
+    ):
         short("linear", "controller.feedback=truth").run(driver="board")
 
 
