@@ -113,7 +113,7 @@ def integrate(model: Bioreactor, start: Array, u: Array, dt: float) -> Array:
     eta[:, 0] = state = start
 
     for k, u_k in enumerate(u[:-1]):
-        eta[:, k + 1] = state = runge_kutta(lambda _, z, u_k=u_k: np.array(model.slope(*z, u_k)), state, dt)
+        eta[:, k + 1] = state = runge_kutta(lambda _, z, u_k=u_k: np.array(model.slope(z[0], z[1], u_k)), state, dt)
     return eta
 
 

@@ -174,7 +174,7 @@ class UpdatedHighGain:
         held = self.Omega(u, *self.saturate(y_before, x[1:])), 0.5 * self.dt, self.phi1, self.phi2, self.phi3
         L_middle = updated_gain(L, *held)
         L_end = updated_gain(L_middle, *held)
-        stages = {0.0: (L, y_before), 0.5: (L_middle, middle), 1.0: (L_end, y)}
+        stages: dict[float, tuple[Scalar, Signals]] = {0.0: (L, y_before), 0.5: (L_middle, middle), 1.0: (L_end, y)}
         return runge_kutta(lambda share, z: np.array(self.slope(z, *stages[share], u)), x, self.dt), L_end
 
     def follow(

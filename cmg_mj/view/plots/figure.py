@@ -184,7 +184,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
             low, high = np.subtract(line.y, below), np.add(line.y, above)
             axes.fill_between(line.x, low, high, color=curve.get_color(), alpha=0.2, linewidth=0)
     for shaded in panel.shaded:
-        span = Span(*shaded)
+        span = shaded if isinstance(shaded, Span) else Span(*shaded)
         style = {"color": span.color, "alpha": 0.25, "linewidth": 0, "zorder": 0, "label": span.label or None}
         axes.axvspan(span.start, span.end, ymax=span.height, **style)
     axes.set_xscale(panel.x_scale)
