@@ -18,7 +18,7 @@ from rich.table import Table
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.board import Board, Cost, temporary_export
-from cmg_mj.features.board.image import build, flash_of, require
+from cmg_mj.features.board.image import FIRMWARE, build, require
 from cmg_mj.features.board.processor import run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.papers.aranovskiy2020.forms_of_10 import Plain
@@ -119,7 +119,8 @@ def cost_of(run: Experiment, controller: Controller) -> UpdateCost:
         The cost.
     """
     with temporary_export(controller) as (observer, folder):
-        flash = flash_of(observer, folder)
+        empty = build(observer, folder, FIRMWARE / "empty.c")  # of the controller and its part of the C library
+        flash = build(observer, folder).flash - empty.flash
         board = Board(build(observer, folder).path, counting=True)
     with board:
         result = run_on(run, board)

@@ -54,10 +54,9 @@ def check_installed(papers: Iterable[str]) -> None:
     Raises:
         InputError: A package is missing.
     """
-    symbolic = sorted(SYMBOLIC.intersection(papers))
+    symbolic = " and ".join(sorted(SYMBOLIC.intersection(papers)))
     if symbolic and find_spec("sympy") is None:
-        names = " and ".join(symbolic)
-        raise InputError(f'{names}: sympy is not installed: python -m pip install "cmg_mj[papers]"')
+        raise InputError(f'{symbolic}: sympy is not installed: python -m pip install "cmg_mj[papers]"')
 
 
 def sections_of(paper: str) -> list[Section]:
@@ -82,15 +81,15 @@ def reproduce(papers: Sequence[str], on_progress: Callable[[str, float], None]) 
     sections = {paper: sections_of(paper) for paper in papers}
     entries = [Reproduction(paper) for paper in papers]
     total = sum(section.seconds for of_paper in sections.values() for section in of_paper)
-    done = 0.0
+    label, done, span = "", 0.0, 0.0
+
+    def on_share(share: float) -> None:
+        on_progress(label, done + share * span)
+
     try:
         for entry in entries:
             for section in sections[entry.paper]:
                 label, span = f"{entry.paper}: {section.title}", section.seconds / total
-
-                def on_share(share: float, label: str = label, begin: float = done, span: float = span) -> None:
-                    on_progress(label, begin + share * span)
-
                 on_share(0.0)
                 start = time.perf_counter()
                 entry.claims += section.claims(on_share)

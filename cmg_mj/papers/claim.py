@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +21,9 @@ VERDICTS = {
 }
 """Verdict -> its meaning: the rule of `Claim.verdict` in words."""
 
+Array = np.ndarray
+"""An array of NumPy's."""
+
 OnShare = Callable[[float], None]
 """Called with the share of a section that is done."""
 
@@ -36,7 +39,7 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """One figure, table, remark, proof or statement. Its verdict follows from what was found and what is declared.
 
@@ -52,7 +55,7 @@ class Claim:
         conditions: The misprint that was mended, or for which part it holds, a whole sentence; empty if neither.
         otherwise: Explanation where it does not hold, a whole sentence.
         figures: The numbers found, by names that end in their unit; `plain` makes them what JSON can hold.
-        pictures: Plots.
+        picture: Plot.
         is_ours: Whether the claim is not the paper's but ours, such as its observer on the rig.
         measures: Measure -> true if the claim holds by it; empty if `holds` is one value.
     """
@@ -66,7 +69,7 @@ class Claim:
     conditions: str = ""
     otherwise: str = "The figures contradict the claim."
     figures: Mapping[str, Any] = field(default_factory=dict)
-    pictures: Sequence[Picture] = ()
+    picture: Picture | None = None
     is_ours: bool = False
     measures: Mapping[str, bool] = field(init=False)
 

@@ -9,16 +9,17 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.claim import Array
 from cmg_mj.papers.recorded import largest_size
 
 
-def rank_margin(matrix: np.ndarray) -> float:
+def rank_margin(matrix: Array) -> float:
     """Return the least singular value by the largest: zero for a matrix without full rank."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return values[-1] / values[0]
 
 
-def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
+def controllability_margin(A: Array, B: Array) -> float:
     """Return the rank margin of [B, A B, ..., A^(n-1) B], for A (n, n) and B (n, m)."""
     columns = [B]
     for _ in range(len(A) - 1):
@@ -26,7 +27,7 @@ def controllability_margin(A: np.ndarray, B: np.ndarray) -> float:
     return rank_margin(np.hstack(columns))
 
 
-def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return MuJoCo's mass matrix at a state, (nv, nv)."""
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
@@ -37,7 +38,7 @@ def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
 def finite_difference_error(model: ReducedModel) -> float:
     """Return the error of a model's A and B against central differences of its nonlinear form, by the largest entry."""
 
-    def f(x: np.ndarray, u: float) -> np.ndarray:
+    def f(x: Array, u: float) -> Array:
         return np.array([x[1], model.tilt_acceleration(float(x[0]), float(x[1]), float(x[2]), u), u])
 
     zero, h = np.zeros(3), 1e-5
@@ -62,7 +63,7 @@ def constants_of(model: ReducedModel) -> dict[str, float]:
     }
 
 
-def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[np.ndarray, np.ndarray]:
+def equilibrium(A: Array, B: Array, K: Array, e: float) -> tuple[Array, Array]:
     """Solve x' = A x + B u, u = -K x + k1 e for its rest. With y1 = x1 - e the bias enters with a plus.
 
     Args:
@@ -78,7 +79,7 @@ def equilibrium(A: np.ndarray, B: np.ndarray, K: np.ndarray, e: float) -> tuple[
     return np.linalg.solve(closed, -B[:, 0] * K[0] * e), np.linalg.eigvals(closed)
 
 
-def poles_as_pairs(poles: np.ndarray) -> list[list[float]]:
+def poles_as_pairs(poles: Array) -> list[list[float]]:
     """List poles, (n,), as [real part, imaginary part], which JSON can hold."""
     return [[p.real, p.imag] for p in poles]
 

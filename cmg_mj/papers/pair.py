@@ -22,7 +22,7 @@ DT = 0.005
 """The bench's control period [s]; the paper does not give its own."""
 DURATION_S = 10.0
 """Duration of the runs that Figs 5 to 7 and their variations are made of [s]."""
-PUSH_RECOVERY: Mapping[str, str] = {"push": "1 N m for 0.1 s", "e": "0.5 deg", "noise": "400 ug/rtHz"}
+PUSH_RECOVERY = {"push": "1 N m for 0.1 s", "e": "0.5 deg", "noise": "400 ug/rtHz"}
 """The push, e and the noise that the papers do not give: those of push_recovery and observer_tuning."""
 SEED_OF_10 = 71_000
 """Seed of the run with (10) in the loop that several sections replay."""

@@ -17,7 +17,7 @@ skew-symmetric, by aranovskiy2020's appendix. The decision for M = diag(m1(q2), 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import sympy as sp
 from sympy.polys.fields import sfield
@@ -156,26 +156,12 @@ def decide(m1: Any) -> Decision:
 
 # --- the papers' inertia ------------------------------------------------------------------------------------
 
-Paper = Literal["aranovskiy2020", "sokolov2019"]
+PRINTED = {"aranovskiy2020": ("Appendix", 2, 0.19), "sokolov2019": ("Proposition 1", 1, 0.13)}
+"""Paper -> place at which it says that the system is not PLvCC; the gimbals of m1 = gimbals (J1 + J2 cos^2 q2)/
+(I_c + I_d) as printed; distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m]."""
 
 
-class PrintedInertia(NamedTuple):
-    """A paper's inertia as printed: m1 = gimbals (J1 + J2 cos^2 q2)/(I_c + I_d)."""
-
-    place: str
-    """Place at which it says that the system is not PLvCC."""
-    gimbals: int
-    arm: float
-    """Distance from the tilt axis of the mass m, which J1 holds as m arm^2/gimbals [m]."""
-
-
-PRINTED: dict[Paper, PrintedInertia] = {
-    "aranovskiy2020": PrintedInertia("Appendix", 2, 0.19),
-    "sokolov2019": PrintedInertia("Proposition 1", 1, 0.13),
-}
-
-
-def papers_m1(paper: Paper, numbers: bool = False) -> Any:
+def papers_m1(paper: str, numbers: bool = False) -> Any:
     """Return m1 as printed, with the symbols J1, J2 and I_c + I_d, or with the exact numbers of Table 1 (Table I)."""
     J1, I_cd = sp.symbols("J1 I_cd", positive=True)
     J2 = sp.Symbol("J2", real=True, nonzero=True)
@@ -188,7 +174,7 @@ def papers_m1(paper: Paper, numbers: bool = False) -> Any:
     return m1.subs({J1: J1_number, J2: J2_number, I_cd: exact["I_c"] + exact["I_d"]})
 
 
-def inertia_factor(paper: Paper) -> int:
+def inertia_factor(gimbals: int) -> int:
     """Return the s of m1 = s (J1 + J2 cos^2 q2)/(I_c + I_d) for which the motion is that of diag(m1, 1).
 
     With T = (M11 w_b^2 + M22 w_c^2)/2, the gimbal's equation is M22 w_c' - M11' w_b^2/2. In both papers the quotient of
@@ -196,7 +182,7 @@ def inertia_factor(paper: Paper) -> int:
     """
     J1, J2, I_cd, q_c = sp.symbols("J1 J2 I_cd q_c", positive=True)
     one_gimbal = J1 + J2 * sp.cos(q_c) ** 2
-    M11 = PRINTED[paper].gimbals * one_gimbal
+    M11 = gimbals * one_gimbal
     M22 = -sp.diff(M11, q_c) / 2 / (J2 / 2 * sp.sin(2 * q_c) / I_cd)
     return int(sp.simplify(M11 / M22 * I_cd / one_gimbal))
 
@@ -268,9 +254,9 @@ def proof_steps() -> dict[str, bool]:
     return steps
 
 
-def claim(paper: Paper) -> Claim:
+def claim(paper: str) -> Claim:
     """Judge the appendix of aranovskiy2020, or Proposition 1 of sokolov2019, whose proof is not printed there."""
-    k, steps = sp.Symbol("k", positive=True), proof_steps()
+    k, steps, (place, gimbals, _) = sp.Symbol("k", positive=True), proof_steps(), PRINTED[paper]
     symbolic, numeric = decide(papers_m1(paper)), decide(papers_m1(paper, numbers=True))
     plvcc = [decide(m1) for m1 in (sp.Symbol("J1", positive=True), sp.exp(2 * k * q2), sp.cosh(k * q2) ** 2)]
     # d = 0 with a constant b: the appendix takes its Psi for singular.
@@ -284,8 +270,8 @@ def claim(paper: Paper) -> Claim:
         "for any factor."
     )
     return Claim(
-        place=PRINTED[paper].place,
-        statement="No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable "
+        place,
+        "No full-rank Psi(q) makes B_(1) and B_(2) skew-symmetric: the system is not partially linearisable "
         "via coordinate changes.",
         holds=all(steps.values())
         and symbolic.Psi is None
@@ -298,7 +284,7 @@ def claim(paper: Paper) -> Claim:
             "table_numbers": numeric.figures,
             "counter_checks": [c.figures | {"Psi": str(c.Psi.tolist())} for c in plvcc if c.Psi is not None],
             "d_zero_alone_is_singular": not (is_solution and trivial.det() != 0),
-            "factor_of_m1_by_the_equations": inertia_factor(paper),
-            "factor_of_m1_printed": PRINTED[paper].gimbals,
+            "factor_of_m1_by_the_equations": inertia_factor(gimbals),
+            "factor_of_m1_printed": gimbals,
         },
     )

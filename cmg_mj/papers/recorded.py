@@ -1,14 +1,14 @@
-"""Readings and pictures of recorded runs that several papers need."""
+"""Readings and pictures of recorded runs that several papers need, and a step of Runge and Kutta."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -26,14 +26,22 @@ def push_intervals(trajectory: Trajectory) -> list[tuple[float, float]]:
     return [(times[0], times[-1])] if len(times) else []
 
 
-def rms(values: np.ndarray) -> Any:
+def rms(values: Array) -> Any:
     """Return the root of the mean square over the ticks, (n_ticks, ...) -> (...)."""
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def largest_size(values: np.ndarray) -> float:
+def largest_size(values: Array) -> float:
     """Return the largest absolute value."""
     return np.abs(values).max()
+
+
+def runge_kutta(slope: Callable[[float, Array], Array], x: Array, h: float) -> Array:
+    """Take one classical step of x' = slope(share of the step, x)."""
+    p = slope(0.0, x)
+    q = slope(0.5, x + 0.5 * h * p)
+    r = slope(0.5, x + 0.5 * h * q)
+    return x + h / 6.0 * (p + 2.0 * (q + r) + slope(1.0, x + h * r))
 
 
 def trace(run: Trajectory, column: str, label: str = "", **style: Any) -> Line:
@@ -83,7 +91,7 @@ def loop_picture(
 
 def open_loop_panels(
     run: Trajectory,
-    rates: Mapping[str, np.ndarray],
+    rates: Mapping[str, Array],
     observers: Mapping[str, str],
     tilt: Line,
     y_range: tuple[float, float],
@@ -120,8 +128,8 @@ ROOM = 0.05
 
 def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
     """Give all panels of one quantity, in all claims' pictures, the range that they all need."""
-    values: dict[str, list[np.ndarray]] = {}
-    for panel in (panel for claim in claims for picture in claim.pictures for panel in picture.panels):
+    values: dict[str, list[Array]] = {}
+    for panel in (panel for claim in claims if claim.picture for panel in claim.picture.panels):
         values.setdefault(panel.y_label, []).extend(np.asarray(line.y) for line in panel.lines)
 
     def scaled(panel: Panel) -> Panel:
@@ -130,6 +138,6 @@ def on_common_scales(claims: Sequence[Claim]) -> list[Claim]:
         return replace(panel, y_range=(low - ROOM * (high - low), high + ROOM * (high - low)))
 
     return [
-        replace(claim, pictures=[replace(p, panels=[scaled(panel) for panel in p.panels]) for p in claim.pictures])
+        replace(claim, picture=claim.picture and replace(claim.picture, panels=[*map(scaled, claim.picture.panels)]))
         for claim in claims
     ]

@@ -26,27 +26,26 @@ def figures_of(entries: Sequence[Reproduction]) -> dict[str, Any]:
             entry.paper: {
                 "complete": entry.complete,
                 "seconds": entry.seconds,
-                "claims": [_figures_of_claim(claim) for claim in entry.claims],
+                "claims": [
+                    {
+                        "place": claim.place,
+                        "says": claim.statement,
+                        "found": found(claim),
+                        "verdict": claim.verdict,
+                        "measures": claim.measures,
+                        "assumes": claim.assumes,
+                        "general": claim.is_general,
+                        "missing": claim.missing_data,
+                        "why": claim.reason,
+                        "ours": claim.is_ours,
+                        "figures": claim.figures,
+                        "pictures": [f"{claim.picture.name}.png"] if claim.picture else [],
+                    }
+                    for claim in entry.claims
+                ],
             }
             for entry in entries
         },
-    }
-
-
-def _figures_of_claim(claim: Claim) -> dict[str, Any]:
-    return {
-        "place": claim.place,
-        "says": claim.statement,
-        "found": found(claim),
-        "verdict": claim.verdict,
-        "measures": claim.measures,
-        "assumes": claim.assumes,
-        "general": claim.is_general,
-        "missing": claim.missing_data,
-        "why": claim.reason,
-        "ours": claim.is_ours,
-        "figures": claim.figures,
-        "pictures": [f"{picture.name}.png" for picture in claim.pictures],
     }
 
 
@@ -88,10 +87,10 @@ def verdict_table(entries: Sequence[Reproduction]) -> str:
 
 
 def _row(claim: Claim) -> tuple[str, ...]:
-    pictures = [f"[picture]({picture.name}.png)" for picture in claim.pictures]
+    place = f"{_place(claim)} [picture]({claim.picture.name}.png)" if claim.picture else _place(claim)
     assumed = "; ".join(f"{name}: {size}" for name, size in claim.assumes.items())
     conditions = " ".join(filter(None, (f"Assumed: {assumed}." if assumed else "", claim.reason)))
-    return " ".join([_place(claim), *pictures]), claim.statement, found(claim), claim.verdict, conditions
+    return place, claim.statement, found(claim), claim.verdict, conditions
 
 
 def report_text(entries: Sequence[Reproduction]) -> str:
@@ -130,7 +129,7 @@ def save_report(folder: RunFolder | Path, entries: Sequence[Reproduction]) -> Pa
     Raises:
         InputError: The folder, or a file, cannot be written.
     """
-    pictures = [picture for entry in entries for claim in entry.claims for picture in claim.pictures]
+    pictures = [claim.picture for entry in entries for claim in entry.claims if claim.picture]
     writers: Writers = {
         "report.md": lambda path: write_text(path, report_text(entries)),
         "figures.json": lambda path: write_text(path, json.dumps(figures_of(entries), indent=2)),

@@ -68,11 +68,11 @@ def test_the_printed_riccati_equation_makes_no_symmetric_matrix_and_hardly_matte
 def test_ten_by_euler_on_floats_and_arrays_is_the_plain_one(exact_gain: bool) -> None:
     run = run_of_10(SEED)
     plain = replay(forms_of_10.Plain(forms_of_10.euler), run).x2
-    by_floats = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), run).x2
+    by_floats = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain=exact_gain), run).x2
     late = slice(200 if exact_gain else 0, None)
     np.testing.assert_allclose(by_floats[late], plain[late], atol=2e-4 if exact_gain else 1e-9)
     columns = {name: np.stack([run[name]] * 2, axis=1) for name in ("y1_rad", "y2_rad", "u_rad_s")}
-    by_arrays = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain), Trajectory(columns)).x2
+    by_arrays = replay(forms_of_10.TenByEuler(DT, printed_model(), exact_gain=exact_gain), Trajectory(columns)).x2
     np.testing.assert_allclose(by_arrays[:, 1], by_floats, rtol=1e-9, atol=1e-12)
 
 

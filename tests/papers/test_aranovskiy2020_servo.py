@@ -104,7 +104,7 @@ def test_a_command_tilts_its_own_axis_as_the_reduced_model_says() -> None:
 
 def test_the_axes_are_separate_and_a_coupling_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     coupling = two_axes.coupling(1.0)
-    assert two_axes.axes_claim({1.0: coupling}).verdict == "reproduced within stated conditions"
+    assert two_axes.one_axis_at_a_time((1.0,)).verdict == "reproduced within stated conditions"
     assert 0.0 < coupling.share < 0.01
     right = two_axes.addresses
 

@@ -19,29 +19,29 @@ from tests.command import cmg_mj
 
 PICTURE = Picture("sokolov2019-fig-1", "a Fig. 1", [Panel("tilt [deg]", [Line([0.0, 1.0], [0.0, 2.0], "true")])])
 GOOD = Claim(
-    place="Fig. 1",
-    statement="it falls | or not",
+    "Fig. 1",
+    "it falls | or not",
     holds=True,
     figures={"time_s": 3.0},
-    pictures=[PICTURE],
+    picture=PICTURE,
 )
-PARTLY = Claim(place="Remark 1", statement="always", holds=True, conditions="It is above 100 Hz.")
+PARTLY = Claim("Remark 1", "always", holds=True, conditions="It is above 100 Hz.")
 OURS = Claim(
-    place="On the rig",
-    statement="it stands",
+    "On the rig",
+    "it stands",
     holds=False,
     otherwise="It is too light.",
     is_ours=True,
 )
 UNKNOWN = Claim(
-    place="Table 2",
-    statement="tuned",
+    "Table 2",
+    "tuned",
     holds={"(9)": True, "(10)": False},
     missing_data="The paper has no recording.",
     otherwise="Ours is another.",
     assumes={"signal": "a sine", "noise": "none"},
 )
-NOT = Claim(place="Section V", statement="best", holds=False, otherwise="The noise is another.")
+NOT = Claim("Section V", "best", holds=False, otherwise="The noise is another.")
 
 
 def sections(*claims: Claim) -> list[Section]:
@@ -153,7 +153,7 @@ def test_one_rule_decides(declared: dict[str, Any], holding: str, failing: str) 
     """By what a claim is declared to depend on and by what was found; no verdict is there whatever was found."""
 
     def verdict(holds: bool | dict[str, bool]) -> str:
-        return Claim(place="Fig. 9", statement="it is so", holds=holds, **declared).verdict
+        return Claim("Fig. 9", "it is so", holds=holds, **declared).verdict
 
     assert (verdict(True), verdict(False)) == (holding, failing)
     assert verdict({"tilt": True, "rate": True}) == holding

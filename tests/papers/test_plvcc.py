@@ -82,7 +82,7 @@ def test_exact_numbers_are_the_models() -> None:
     from tests.plant import paper_model as paper
 
     for name, J1, gimbals in (("aranovskiy2020", paper.J1, 2), ("sokolov2019", paper.J1_single, 1)):
-        m1 = sp.lambdify(q2, plvcc.papers_m1(name, numbers=True))  # type: ignore[arg-type]
+        m1 = sp.lambdify(q2, plvcc.papers_m1(name, numbers=True))
         expected = gimbals * (J1 + paper.J2 * np.cos(0.4) ** 2) / (paper.I_c + paper.I_d)
         assert m1(0.4) == pytest.approx(expected, rel=1e-12)
 

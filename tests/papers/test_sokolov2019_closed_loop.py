@@ -71,17 +71,19 @@ def test_the_figures_on_other_seeds(runs: Loops, figures: dict[str, Claim], cycl
 
 def test_every_figure_shows_its_own_observers_runs(runs: Loops, figures: dict[str, Claim], cycles: Cycles) -> None:
     """Not another's: the figures, and the curves of the pictures, which share their scales."""
+    first = figures["linear"].picture
     for name, claim in figures.items():
+        assert first is not None
+        assert claim.picture is not None
         no_gap, gap = runs.by_bias[0.25][name], runs.gap[name]
         assert claim.figures["without_backlash"] == numbers(no_gap)
         assert claim.figures["with_backlash"] == numbers(gap)
         assert claim.figures["cycle_amplitude_deg"] == cycles.ends[name].amplitude_deg
-        (figure_picture,) = claim.pictures
-        for panel, result in zip(figure_picture.panels[2:4], (no_gap, gap), strict=True):
+        for panel, result in zip(claim.picture.panels[2:4], (no_gap, gap), strict=True):
             rates, recorded = [line.y for line in panel.lines], trajectory_of(result)
             np.testing.assert_array_equal(rates[0], recorded[f"estimate/{name}/x2_rad_s"][:, 0])
             np.testing.assert_array_equal(rates[1], recorded["x2_rad_s"][:, 0])
-            assert panel.y_range == figures["linear"].pictures[0].panels[2].y_range is not None
+            assert panel.y_range == first.panels[2].y_range is not None
     four = figures["linear"].figures
     assert four["gyro"] == numbers(runs.gyro)
     assert four["main_frequency_hz"] == pytest.approx(four["predicted_frequency_hz"], rel=0.15)

@@ -150,7 +150,7 @@ def test_arguments_are_limited_where_the_paper_limits_them() -> None:
         saturate=lambda y, x: ((min(y[0], 0.5),), tuple(min(v, 2.0) for v in x)),
     )
     observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
-    observer.step(observer.init((0.9,), (1.0, 5.0, -3.0)), (0.9,), "u")
+    observer.step(np.array([1.0, 5.0, -3.0]), 2.0, (0.9,), (0.9,), "u")
     assert arguments["f1"] == ("u", (0.9,), ())
     observer.slope((1.0, 5.0, -3.0), 2.0, (0.9,), "u")
     assert arguments["f2"] == ("u", (0.5,), (2.0,))
@@ -162,30 +162,19 @@ def test_arguments_are_limited_where_the_paper_limits_them() -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_arrays_equal_floats_bit_by_bit(n: int) -> None:
-    """With f, a and Omega that do (arithmetic alone)."""
+def test_runs_side_by_side_are_each_its_own(n: int) -> None:
+    """Bit by bit, with f and Omega that are (arithmetic alone)."""
     f = [lambda u, y, x: -u * y[0], lambda u, y, x: u * y[0] - x[0], lambda u, y, x: 0.5 * x[0] - x[1] * u][:n]
     observer = UpdatedHighGain(
         0.01, tuple(f), BiLimitCorrection((4.0, 2.0, 1.0)[3 - n :], 0.3), lambda u, y, x: abs(y[0]) + abs(u), 0.3, **PHI
     )
     rng = np.random.default_rng(0)
-    y, u = rng.normal(0.0, 1.0, (40, 5)), rng.normal(0.0, 1.0, (40, 5))
-
-    def walk(column: Any) -> Any:
-        def column_of(values: np.ndarray) -> Any:
-            return values if column is None else float(values[column])
-
-        state = observer.init((column_of(y[0]),), (column_of(y[0]), *[0.0 * column_of(y[0])] * (n - 1)))
-        for k in range(1, 40):
-            state = observer.step(state, (column_of(y[k]),), column_of(u[k - 1]))
-        return state
-
-    many = walk(None)
+    y, u = rng.normal(0.0, 1.0, (40, 5)), rng.normal(0.0, 1.0, 40).tolist()
+    x, L = observer.follow((y,), (0.5,) * n, u)
     for i in range(5):
-        single = walk(i)
-        assert [float(x[i]) for x in many.x] == list(single.x)
-        assert float(many.L[i]) == single.L
-        assert all(type(number) is float for number in (*single.x, single.L))
+        single_x, single_L = observer.follow((y[:, i : i + 1],), (0.5,) * n, u)
+        assert np.array_equal(x[..., i : i + 1], single_x)
+        assert np.array_equal(L[:, i : i + 1], single_L)
 
 
 @pytest.mark.parametrize("error", [1.0, 100.0])

@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.errors import InputError, shown
 from cmg_mj.features.board.image import build, require
 from cmg_mj.features.board.qemu import Board, Cost
 from cmg_mj.features.export import export
@@ -33,11 +32,6 @@ def temporary_export(controller: Controller) -> Iterator[tuple[str, Path]]:
     Raises:
         InputError: The controller cannot be exported.
     """
-    if controller.feedback != "observer":
-        raise InputError(
-            f"controller.feedback = {shown(controller.feedback)}: a board has no such sensor; it closes the loop "
-            "on its own estimate, 'observer'"
-        )
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
         export(controller, Path(folder), precision="single", name="on_board")
         yield "on_board", Path(folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +20,6 @@ PACKAGES = {
 """Program or file -> its Debian package."""
 
 FIRMWARE = Path(__file__).parent / "firmware"
-EMPTY = FIRMWARE / "empty.c"
-"""A controller that does nothing."""
 
 CORE = ("-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard")
 """Flags of the STM32F746: a Cortex-M7 whose floating-point unit has single precision alone."""
@@ -62,11 +59,6 @@ def missing() -> list[str]:
     return list(dict.fromkeys(package for name, package in PACKAGES.items() if not _is_installed(name)))
 
 
-def available() -> bool:
-    """Return whether a controller can be exported, built and emulated here."""
-    return not missing() and find_spec("casadi") is not None
-
-
 def require() -> None:
     """Require all Debian packages.
 
@@ -93,7 +85,7 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     Args:
         observer: The observer's name in C.
         folder: Folder of the .h and .c files, to which the image is written.
-        controller: Another file in place of the .c file, such as `EMPTY`.
+        controller: Another file in place of the .c file, such as `empty.c` of the firmware, which does nothing.
 
     Returns:
         The image.
@@ -111,16 +103,3 @@ def build(observer: str, folder: Path, controller: Path | None = None) -> Image:
     )
     text, data, *_ = compiler.build([SIZE, path], f"{observer}: {SIZE}").splitlines()[1].split()
     return Image(path, int(text) + int(data))
-
-
-def flash_of(observer: str, folder: Path) -> int:
-    """Measure the flash of a controller and its part of the C library: an image less one with an empty controller.
-
-    Args:
-        observer: The observer's name in C.
-        folder: Folder of the .h and .c files.
-
-    Returns:
-        The size [bytes].
-    """
-    return build(observer, folder).flash - build(observer, folder, EMPTY).flash

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller, KnownPlant, Tick
-from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.errors import RunStopped
 from cmg_mj.core.runners import as_estimate
 from cmg_mj.core.types import Forces, Law, Measurement, Observer
 from cmg_mj.results.result import Result
@@ -76,9 +76,6 @@ class ProcessorController(Controller):
         sensors: What stands between the ideal readings and the processor.
         plant: The controller's knowledge of the plant.
         **options: Those of `Controller`.
-
-    Raises:
-        InputError: There are many worlds, or the rate is not to be the observer's.
     """
 
     def __init__(
@@ -94,8 +91,6 @@ class ProcessorController(Controller):
         self._remote = _RemoteObserver(observer)
         super().__init__(self._remote, law, sensors, plant, **options)
         self.observer = observer
-        if not isinstance(self.worlds, int) or self.feedback != "observer":
-            raise InputError("a processor runs one world, on the observer's rate: no batch, and feedback = 'observer'")
 
     def reset(self) -> None:
         """Forget everything, the processor too."""

@@ -158,7 +158,7 @@ extern "C" {{
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
         results = [
             f"controller->{x}"
-            for x in (*(f"observer.{member}" for member in traced.state), *self.law.finite_members, "u")
+            for x in (*(f"observer.{member}" for member in traced.state), *self.law.memory("law.", "x_e"), "u")
         ] + estimate
         x1, x3 = ("y1", "y2") if self.controller.angle_source == "measured" else (estimate[0], estimate[2])
         here = {name: name for name in (*MEASURED, "estimate")}
@@ -264,7 +264,9 @@ static int is_finite({real} x)
 
     def _numbers(self) -> str:
         """Print the constants with their meanings."""
-        lines = [(f"{c.name} = {literal(c.value, self.precision)};", c.meaning) for c in self.constants.all]
+        constants = self.constants
+        shown = [*constants.of_measure, *constants.of_law, *([constants.trim_gain] if constants.trimmed else [])]
+        lines = [(f"{c.name} = {literal(c.value, self.precision)};", c.meaning) for c in shown]
         width = max(len(text) for text, _ in lines)
         return "".join(f"static const {self.name}_real {text:<{width}} /* {words} */\n" for text, words in lines)
 
@@ -428,25 +430,22 @@ class LawPrinter(NamedTuple):
         beside = ", without its integrator" if self.law.has_integrator else ""
         return f"/* The law's state{beside}. */\ntypedef struct {{\n{members}}} {self.name}_law_state;\n\n"
 
-    @property
-    def finite_members(self) -> list[str]:
-        """Members of the controller that must be finite after a decision, besides u."""
-        return self._memory("law.", "x_e")
-
     def functions(self, print_body: PrintBody) -> str:
         """Print `law`, and `init_law` if it has one."""
-        law, memory = self.law, self._memory("state->", "*x_e")
+        law, memory = self.law, self.memory("state->", "*x_e")
         inputs, outputs = [*law.arguments, *memory, *self.constants], ["*u", *memory]
-        step = f"{self._step_head()}\n{{\n{print_body(law.step, inputs, outputs)}}}\n"
+        real, estimates = f"{self.name}_real", f"{self.name.upper()}_ESTIMATES"
+        texts = {"estimate": f"const {real} estimate[{estimates}]"}
+        parameters = [texts.get(name, f"{real} {name}") for name in self._parameters()]
+        head = function_head("static void law", [*parameters, *self._pointers(), f"{real} *u"])
+        step = f"{head}\n{{\n{print_body(law.step, inputs, outputs)}}}\n"
         if law.is_state_feedback:
             words = "u = -K_e [x1, x2, x3, x_e], limited; then a step of the integrator, unless it would wind up."
             return f"/* {words} */\n{step}"
         step = f"/* {self.described}: u, not yet limited, and the next state. */\n{step}"
         if law.init is None or not memory:
             return step
-        init = function_head(
-            "static void init_law", [*(f"{self.name}_real {name}" for name in law.measured), *self._pointers()]
-        )
+        init = function_head("static void init_law", [*(f"{real} {name}" for name in law.measured), *self._pointers()])
         start = f"{init}\n{{\n{print_body(law.init, MEASURED, memory)}}}\n"
         return f"/* {self.described}: the state before the first decision. */\n{start}\n{step}"
 
@@ -473,17 +472,11 @@ class LawPrinter(NamedTuple):
         """
         return f"law({', '.join([*(values[name] for name in self._parameters()), *self._passed(state, x_e), u])});"
 
-    def _step_head(self) -> str:
-        real, estimates = f"{self.name}_real", f"{self.name.upper()}_ESTIMATES"
-        texts = {"estimate": f"const {real} estimate[{estimates}]"}
-        parameters = [texts.get(name, f"{real} {name}") for name in self._parameters()]
-        return function_head("static void law", [*parameters, *self._pointers(), f"{real} *u"])
-
     def _parameters(self) -> list[str]:
         """Name the parameters of `law` before its pointers; extra signals come as the whole estimate."""
         return list(dict.fromkeys(name.partition("[")[0] for name in self.law.arguments))
 
-    def _memory(self, member: str, x_e: str) -> list[str]:
+    def memory(self, member: str, x_e: str) -> list[str]:
         """Place the numbers of the state, the integrator last."""
         return [*(f"{member}{name}" for name in self.law.state), *([x_e] if self.law.has_integrator else [])]
 

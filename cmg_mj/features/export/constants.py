@@ -42,11 +42,6 @@ class Constants(NamedTuple):
     trim_part: int
     gimbals: int
 
-    @property
-    def all(self) -> list[Constant]:
-        """The constants at the top of the C file."""
-        return [*self.of_measure, *self.of_law, *([self.trim_gain] if self.trimmed else [])]
-
 
 def constants_of(controller: Controller) -> Constants:
     """Collect the constants of a controller."""

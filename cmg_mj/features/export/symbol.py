@@ -225,7 +225,8 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
     except (InputError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise InputError(f"{name} raised {raised(error)} {raised_at(error)}") from error
+        walked = reversed(list(traceback.walk_tb(error.__traceback__)))
+        raise InputError(f"{name} raised {raised(error)} {_locate(walked)}") from error
 
 
 _LIBRARY_PATHS = (
@@ -244,12 +245,8 @@ def here() -> str:
     return _locate(traceback.walk_stack(sys._getframe(1)))
 
 
-def raised_at(error: BaseException) -> str:
-    """Locate the innermost line of the user's code that an exception came from."""
-    return _locate(reversed(list(traceback.walk_tb(error.__traceback__))))
-
-
 def _locate(frames: Iterable[tuple[FrameType, int]]) -> str:
+    """Locate the first line of the user's code among frames, the innermost first."""
     for frame, line in frames:
         file = frame.f_code.co_filename
         if not file.startswith(_LIBRARY_PATHS):

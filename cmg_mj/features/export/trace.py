@@ -80,28 +80,15 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         return Traced(tuple(names), _measure(constants), init, step, law_formulas)
 
 
-class _Recording(NamedTuple):
-    """The init and a step of an observer or a law, run once with symbols.
+def _record(
+    part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, Sequence[Any]]]
+) -> tuple[list[Symbol], Any, list[Leaf], list[Symbol], list[casadi.SX], list[casadi.SX]]:
+    """Run a part's init and, with symbols in the place of its state's numbers, a step.
 
-    Attributes:
-        first: The measurement that init took.
-        state: Its state.
-        leaves: The numbers in that state.
-        symbols: A symbol for each of them, which the step took.
-        after: The numbers in the state that the step returned.
-        outputs: What it returned beside the state.
+    Returns:
+        The measurement that init took; its state, and the numbers in it; a symbol for each of them, which the step
+        took; the numbers in the state that the step returned; what it returned beside the state.
     """
-
-    first: list[Symbol]
-    state: Any
-    leaves: list[Leaf]
-    symbols: list[Symbol]
-    after: list[casadi.SX]
-    outputs: list[casadi.SX]
-
-
-def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, Sequence[Any]]]) -> _Recording:
-    """Run a part's init and, with symbols in the place of its state's numbers, a step."""
     first = symbols_named(MEASURED)
     state = call_traced("init(y)", lambda: part.init(Measurement(*first)))
     leaves = list(numbers(state))
@@ -113,7 +100,7 @@ def _record(part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, S
     next_state = [expression(leaf.value) for leaf in numbers(after)]
     if form(after) != form(state):
         raise InputError("its step returns a state that is made otherwise than the one of init")
-    return _Recording(first, state, leaves, symbols, next_state, [expression(output) for output in outputs])
+    return first, state, leaves, symbols, next_state, [expression(output) for output in outputs]
 
 
 def _measure(constants: Constants) -> casadi.Function:

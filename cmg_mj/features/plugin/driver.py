@@ -74,14 +74,25 @@ def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int)
         state[SEED], state[WORLD] = seed, world
 
 
+class _Plugin(ctypes.Structure):
+    """The beginning of MuJoCo's mjpPlugin."""
+
+    _fields_ = (("name", ctypes.c_char_p),)
+
+
 def instance_states(model: mujoco.MjModel, data: mujoco.MjData) -> list[np.ndarray]:
     """Return the states of the plugins of this package, which may be written to.
 
     Raises:
         InputError: The model has no such plugin.
     """
-    starts = zip(_plugin_names(model), model.plugin_stateadr.tolist(), strict=True)
-    states = [data.plugin_state[start:] for name, start in starts if name.startswith(OWN)]
+    library = mujoco_library()
+    library.mjp_getPluginAtSlot.restype = ctypes.POINTER(_Plugin)  # its names MuJoCo's Python package does not tell
+    states = [
+        data.plugin_state[start:]
+        for slot, start in zip(model.plugin.tolist(), model.plugin_stateadr.tolist(), strict=True)
+        if library.mjp_getPluginAtSlot(slot).contents.name.decode().startswith(OWN)
+    ]
     if not states:
         raise InputError("the model has no plugin of cmg_mj's")
     return states
@@ -110,16 +121,3 @@ def initial_states(model: mujoco.MjModel, data: mujoco.MjData, seed: int, worlds
         set_world(model, data, seed, world)
         mujoco.mj_getState(model, data, state, kind)
     return states
-
-
-class _Plugin(ctypes.Structure):
-    """The beginning of MuJoCo's mjpPlugin."""
-
-    _fields_ = (("name", ctypes.c_char_p),)
-
-
-def _plugin_names(model: mujoco.MjModel) -> list[str]:
-    """Name the plugin of each instance of a model, which MuJoCo's Python package does not tell."""
-    library = mujoco_library()
-    library.mjp_getPluginAtSlot.restype = ctypes.POINTER(_Plugin)
-    return [library.mjp_getPluginAtSlot(slot).contents.name.decode() for slot in model.plugin.tolist()]

@@ -174,11 +174,6 @@ _numbers = itertools.count()
 """A process registers a plugin's name once."""
 
 
-def unused_name() -> str:
-    """Name a plugin as none in this process has been named."""
-    return f"run_{next(_numbers)}"
-
-
 def run_with_plugin(experiment: Experiment, world: int, **options: Unpack[SimulationOptions]) -> Result:
     """Run one world with a plugin in the model, whose library is compiled and loaded.
 
@@ -186,7 +181,7 @@ def run_with_plugin(experiment: Experiment, world: int, **options: Unpack[Simula
         InputError: Something in use cannot be exported, or there is no compiler.
     """
     require_tools()
-    made = make_plugin(experiment, unused_name(), world=world)
+    made = make_plugin(experiment, f"run_{next(_numbers)}", world=world)
     plant = copy.copy(experiment.plant)
     with tempfile.TemporaryDirectory() as temporary, set_control_callback(None):
         written = write_plugin(made, Path(temporary))

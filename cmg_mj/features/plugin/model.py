@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,15 +17,6 @@ from cmg_mj.plant.elements import EQUILIBRIUM_KEY
 from cmg_mj.plant.mjcf import as_mjcf, compile_model, quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
 
-Framed = (
-    mujoco.MjsBody
-    | mujoco.MjsSite
-    | mujoco.MjsJoint
-    | mujoco.MjsGeom
-    | mujoco.MjsCamera
-    | mujoco.MjsLight
-    | mujoco.MjsFrame
-)
 PLACES = {
     mujoco.MjsBody: ("body", "quat"),
     mujoco.MjsSite: ("site", "quat"),
@@ -126,7 +118,7 @@ def _take_out_of_frames(spec: mujoco.MjSpec, drawn: mujoco.MjModel) -> None:
                 setattr(element, name, getattr(drawn, f"{kind}_{name}")[element.id])
 
 
-def _frames_around(element: Framed) -> list[mujoco.MjsFrame]:
+def _frames_around(element: Any) -> list[mujoco.MjsFrame]:
     """List the frames that an element is in, the innermost first."""
     frames = []
     while (frame := element.frame) is not None:

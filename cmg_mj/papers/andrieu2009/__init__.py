@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from cmg_mj.papers.andrieu2009 import bioreactor, figures, on_the_rig, theorem_1, theory
-from cmg_mj.papers.claim import Section, section
+from cmg_mj.papers.claim import section
 
-SECTIONS: list[Section] = [
+SECTIONS = [
     section(
         "inequalities and theorems",
         3.0,

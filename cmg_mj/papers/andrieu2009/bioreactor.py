@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, reduce
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, clip, signed_power
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.recorded import largest_size
 
 # --- andrieu2009 as printed: system (1), and the bioreactor's and its observers' parameters of section 3 ---
@@ -43,11 +42,8 @@ def dilution(t: float) -> float:
 
 # --- The bioreactor of section 3: Contois model (14), observability form (15), bounds on its increments ---
 
+
 # Normalised variables: no units; time is the paper's, in its normalised seconds.
-Array = Any
-"""A float or an array; everything here is elementwise."""
-
-
 @dataclass(frozen=True)
 class Bioreactor:
     """(14) with one value of hbar, and the set M_eta in which it stays."""
@@ -64,44 +60,44 @@ class Bioreactor:
         """epsilon_1 that belongs to it."""
         return (1.0 - U_MAX) * self.eps2 / (self.hbar * U_MAX)
 
-    def slope(self, eta1: Array, eta2: Array, u: Array) -> tuple[Array, Array]:
+    def slope(self, eta1: Scalar, eta2: Scalar, u: Scalar) -> tuple[Scalar, Scalar]:
         """Return the right-hand side of (14)."""
         growth = self.to_x2(eta1, eta2)
         return growth - u * eta1, -growth + u * (1.0 - eta2)
 
-    def to_x2(self, eta1: Array, eta2: Array) -> Array:
+    def to_x2(self, eta1: Scalar, eta2: Scalar) -> Scalar:
         """Return the second component of F, the growth in (14)."""
         return eta1 * eta2 / (self.hbar * eta1 + eta2)
 
-    def to_eta2(self, x1: Array, x2: Array) -> Array:
+    def to_eta2(self, x1: Scalar, x2: Scalar) -> Scalar:
         """Return the second component of F's inverse."""
         return self.hbar * x1 * x2 / (x1 - x2)
 
-    def x2_bounds(self, x1: Array) -> tuple[Array, Array]:
+    def x2_bounds(self, x1: Scalar) -> tuple[Scalar, Scalar]:
         """Return the least and largest x2 of M_x at an x1 that lies in [eps1, 1 - eps2]."""
         return self.to_x2(x1, self.eps2), self.to_x2(x1, 1.0 - x1)
 
-    def limit(self, x1: Array, x2: Array) -> tuple[Array, Array]:
+    def limit(self, x1: Scalar, x2: Scalar) -> tuple[Scalar, Scalar]:
         """Return x_1s and x_2s."""
         x1 = clip(x1, self.eps1, 1.0 - self.eps2)
         return x1, clip(x2, *self.x2_bounds(x1))
 
-    def coefficients(self, u: Array, x1: Array) -> tuple[Array, Array, Array, Array]:
+    def coefficients(self, u: Scalar, x1: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
         """Return m0 to m3 of (15)."""
         hbar, first, second = self.hbar, self.hbar * x1, self.hbar * x1**2
         return u / hbar, -u - 1.0 / hbar - 2.0 * u / first, 2.0 / first + u / second, (hbar - 1.0) / second
 
-    def f2(self, u: Array, x1: Array, x2: Array) -> Array:
+    def f2(self, u: Scalar, x1: Scalar, x2: Scalar) -> Scalar:
         """Return f2 of (15)."""
         m0, m1, m2, m3 = self.coefficients(u, x1)
         return m0 + x2 * (m1 + x2 * (m2 + x2 * m3))
 
-    def f2_slope(self, u: Array, x1: Array, x2: Array) -> Array:
+    def f2_slope(self, u: Scalar, x1: Scalar, x2: Scalar) -> Scalar:
         """Return df2/dx2."""
         _, m1, m2, m3 = self.coefficients(u, x1)
         return m1 + x2 * (2.0 * m2 + 3.0 * m3 * x2)
 
-    def domain(self, points: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def domain(self, points: int) -> tuple[Array, Array, Array]:
         """Return a grid of M_u x M_x with its corners, denser at small x1: u, x1, x2, each (points, points, points)."""
         x1 = np.geomspace(self.eps1, 1.0 - self.eps2, points)[:, None, None]
         low, high = self.x2_bounds(x1)
@@ -115,7 +111,7 @@ class Bioreactor:
         """df_2max: the largest |df2/dx2| over M_u x M_x, for the constant gain."""
         return largest_size(self.f2_slope(*self.domain(120)))
 
-    def Omega1(self, u: Array, x1: Array, x2_hat: Array) -> Array:
+    def Omega1(self, u: Scalar, x1: Scalar, x2_hat: Scalar) -> Scalar:
         """Return Omega_1, for the updated gain: the largest |slope of a secant of f2 from x2_hat|.
 
         The secant's slope is a parabola in x2, so it is largest at an end of the interval or at the vertex.
@@ -134,7 +130,7 @@ class Bioreactor:
         vertex = clip(-0.5 * m / _not_zero(m3), low, high)
         return _largest(lambda x2: m1 + m * (x2_hat + x2) + m3 * x2**2, low, high, vertex)
 
-    def Omega2(self, u: Array, x1: Array, x2_hat: Array, p: float, *, with_misprint: bool = False) -> Array:
+    def Omega2(self, u: Scalar, x1: Scalar, x2_hat: Scalar, p: float, *, with_misprint: bool = False) -> Scalar:
         """Return Omega_2, for the updated gain and the homogeneous correction.
 
         Its last term is m3 x2^(2-p); the paper prints m2 there, which is not what its inequality needs. Its derivative
@@ -157,17 +153,17 @@ class Bioreactor:
         at_estimate, share = m1 + m * x2_hat, x2_hat**p
         return _largest(lambda x2: at_estimate + share * x2 ** (1.0 - p) * (m + last * x2), low, high, stationary)
 
-    def local_c_inf(self, u: Array, x1: Array, x2: Array, x2_hat: Array, p: float) -> Array:
+    def local_c_inf(self, u: Scalar, x1: Scalar, x2: Scalar, x2_hat: Scalar, p: float) -> Scalar:
         """Return what c_inf of the same bound is the largest value of."""
         _, _, m2, m3 = self.coefficients(u, x1)
         return np.abs((m2 + m3 * x2_hat) * x2 ** (1.0 - p) + m3 * x2 ** (2.0 - p))
 
 
-def _largest(function: Any, *arguments: Array) -> Array:
-    return functools.reduce(np.maximum, (np.abs(function(x2)) for x2 in arguments))
+def _largest(function: Any, *arguments: Scalar) -> Scalar:
+    return reduce(np.maximum, (np.abs(function(x2)) for x2 in arguments))
 
 
-def _not_zero(m: Array) -> Array:
+def _not_zero(m: Scalar) -> Scalar:
     """Replace 0 by a tiny number: for hbar = 1, m3 = 0 and there is no stationary point."""
     return np.where(m == 0.0, 1e-300, m)
 
@@ -193,9 +189,8 @@ def invariance() -> Claim:
     reactor = Bioreactor(HBAR)
     inflow = {hbar: least_inflow(Bioreactor(hbar), U_MIN, U_MAX) for hbar in (HBAR, HBAR_OF_OBSERVERS)}
     return Claim(
-        place="Section 3, (14), M_eta",
-        statement="M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, "
-        "u_max].",
+        "Section 3, (14), M_eta",
+        "M_eta = {eta1 >= eps1, eta2 >= eps2, eta1 + eta2 <= 1} is forward invariant for u in [u_min, u_max].",
         holds=min(inflow.values()) > -ROUNDING,
         figures={
             "least_inflow_per_time": inflow,
@@ -224,15 +219,15 @@ def coordinates() -> Claim:
     """Judge (15)."""
     slope, inverse = map(max, coordinate_errors(HBAR), coordinate_errors(HBAR_OF_OBSERVERS))
     return Claim(
-        place="Section 3, (15)",
-        statement="In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
+        "Section 3, (15)",
+        "In the coordinates x = F(eta) the system has the explicit observability canonical form, with f2 a "
         "cubic in x2.",
         holds=slope < 1e-6 and inverse < 1e-9,
         figures={"largest_f2_error_ratio": slope, "largest_inverse_error_ratio": inverse},
     )
 
 
-@functools.cache
+@cache
 def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[str, float]:
     """Evaluate both inequalities of section 3 over a grid of (u, x1, x2, x2_hat).
 
@@ -262,7 +257,7 @@ def increments_over_domain(hbar: float, p: float = P, points: int = 32) -> dict[
     slope = np.abs(reactor.f2_slope(*point))
     ratio = Omega2 / Omega1
 
-    def largest_quotient(Omega: np.ndarray, c: np.ndarray | float) -> float:
+    def largest_quotient(Omega: Array, c: Array | float) -> float:
         return (increment / np.where(distinct, Omega * d + c * d ** (1.0 + p), 1.0)).max()
 
     return {
@@ -290,8 +285,8 @@ def increments() -> Claim:
         "secant's slope is parted."
     )
     return Claim(
-        place="Section 3, Omega_1, Omega_2, c_inf",
-        statement="|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf "
+        "Section 3, Omega_1, Omega_2, c_inf",
+        "|f2(x2) - f2(x2_hat)| is at most Omega_1 |x2 - x2_hat|, and at most Omega_2 |x2 - x2_hat| + c_inf "
         "|x2 - x2_hat|^(1+p).",
         holds=max(bounds) <= 1.0 + ROUNDING,
         conditions=correction if printed > 1.0 + ROUNDING else "",
@@ -311,8 +306,8 @@ def order_of_bounds() -> Claim:
         "Omega1_over_df2_max_ratio": quotients["Omega1_over_largest_ratio"],
     }
     return Claim(
-        place="Section 3, order of the bounds",
-        statement="df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
+        "Section 3, order of the bounds",
+        "df2/dx2 <= Omega_2 <= Omega_1 <= df2_max over the whole domain.",
         holds={
             "df2/dx2 <= Omega_2": figures["slope_over_Omega2_ratio"] <= 1.0 + ROUNDING,
             "Omega_2 <= Omega_1": figures["Omega2_over_Omega1_ratio"] <= 1.0 + ROUNDING,
@@ -331,8 +326,8 @@ def noise_level() -> Claim:
     reactor = Bioreactor(HBAR)
     tenth = 0.1 * (1.0 - reactor.eps2 - reactor.eps1)
     return Claim(
-        place="Section 3.1, the noise",
-        statement=f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
+        "Section 3.1, the noise",
+        f"The noise on eta1 has the standard deviation {NOISE}, said to be a tenth of the range of eta1.",
         holds=abs(tenth - NOISE) < 0.005,
         otherwise=f"The two figures do not agree. All else here uses {NOISE}; Fig. 2's order holds with either.",
         figures={"tenth_of_domain": tenth, "noise_used": NOISE},

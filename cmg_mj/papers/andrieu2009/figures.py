@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,10 +25,10 @@ from cmg_mj.papers.andrieu2009.bioreactor import (
     dilution,
 )
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, Signals, UpdatedHighGain, largest_b
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
+from cmg_mj.papers.recorded import rms, runge_kutta
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
-Array = np.ndarray
 NOISE_PERIOD = 0.01
 DURATION = 50.0
 LOUD = 0.0986
@@ -40,7 +40,7 @@ TIME = "time [normalised]"
 WINDOWS = ((5.0, 10.0), (15.0, 20.0), (28.0, 35.0), (42.0, 50.0))
 """The later part of each of the four inputs."""
 
-ASSUMED: Mapping[str, str] = {
+ASSUMED = {
     "initial values": "drawn from M_eta for each seed",
     "noise": "a new value every 10 ms, straight in between",
 }
@@ -112,14 +112,8 @@ def integrate(model: Bioreactor, start: Array, u: Array, dt: float) -> Array:
     eta = np.empty((2, len(u), start.shape[1]))
     eta[:, 0] = state = start
 
-    def slope(z: Array, u_k: Array) -> Array:
-        return np.array(model.slope(z[0], z[1], u_k))
-
     for k, u_k in enumerate(u[:-1]):
-        p = slope(state, u_k)
-        q = slope(state + 0.5 * dt * p, u_k)
-        r = slope(state + 0.5 * dt * q, u_k)
-        eta[:, k + 1] = state = state + dt / 6.0 * (p + 2.0 * (q + r) + slope(state + dt * r, u_k))
+        eta[:, k + 1] = state = runge_kutta(lambda _, z, u_k=u_k: np.array(model.slope(z[0], z[1], u_k)), state, dt)
     return eta
 
 
@@ -149,22 +143,12 @@ def replay(kind: str, run: Run, model: Bioreactor, *, p: float = P, b: float = B
         return model.Omega2(u, y[0], x[0], P)
 
     f = (lambda u, y, x: -u * y[0], lambda u, y, x: model.f2(u, y[0], x[0]))
-    phi1, phi2, phi3 = PHI1, PHI2, PHI3
+    phi = PHI1, PHI2, PHI3
     if kind == CONSTANT:  # L stays at the gain to which (8) tends with df2_max for Omega
-        phi1, phi2, phi3 = 1.0, PHI2 + PHI3 / PHI1 * model.df2_max, 1.0
+        phi = 1.0, PHI2 + PHI3 / PHI1 * model.df2_max, 1.0
     if kind != HOMOGENEOUS:
         p, b = 0.0, 1.0  # a linear correction
-    observer = UpdatedHighGain(
-        dt=run.t[1],
-        f=f,
-        correction=BiLimitCorrection((L1, L2), p),
-        Omega=Omega,
-        b=b,
-        phi1=phi1,
-        phi2=phi2,
-        phi3=phi3,
-        saturate=saturate,
-    )
+    observer = UpdatedHighGain(run.t[1], f, BiLimitCorrection((L1, L2), p), Omega, b, *phi, saturate)
     _, x2 = model.limit(run.start[0], model.to_x2(*run.start))
     x, L = observer.follow((run.y,), (run.y[0], x2), run.u[:, 0].tolist())
     eta2_error = run.eta[1] - model.to_eta2(*model.limit(*x))
@@ -189,7 +173,7 @@ def window_means(run: Run, values: Array) -> Array:
 
 def rms_late(run: Run, values: Array) -> Array:
     """Return the RMS after 5, one number a seed."""
-    return np.sqrt(np.mean(values[run.t > 5.0] ** 2, axis=0))
+    return rms(values[run.t > 5.0])
 
 
 class Study(NamedTuple):
@@ -251,12 +235,12 @@ def claims() -> list[Claim]:
 # --- Fig. 1: the local incremental rate of f2 and its three estimates ---
 
 
-def by_window(study: Study, replays: Replays, field: str) -> np.ndarray:
+def by_window(study: Study, replays: Replays, field: str) -> Array:
     """Return the mean of a field of `Replay`, (3 observers, 4 windows)."""
     return np.array([window_means(study.run, getattr(replays[kind], field)) for kind in KINDS])
 
 
-def ordered_rates(study: Study) -> tuple[np.ndarray, np.ndarray]:
+def ordered_rates(study: Study) -> tuple[Array, Array]:
     """Return the means of `RATES` over windows and seeds, (4 rates, 4 windows), and the windows in order."""
     means = np.vstack([by_window(study, study.nominal, "rate"), window_means(study.run, study.rate)])
     return means, np.all(np.diff(means, axis=0) <= 0.0, axis=0)
@@ -273,26 +257,29 @@ def figure_1(study: Study) -> Claim:
         rates = [Line(study.run.t, curves[i], RATES[i], color=i, width=0.8 if i in (1, 2) else 1.6) for i in indices]
         return rates + [Line(middles, means[i], "", "ko", width=0.0) for i in indices]
 
-    title = "andrieu2009, Fig. 1: local incremental rate of f2 and its estimates (dots: means over seeds)"
     panels = [
         Panel("[1/normalised time]", lines(0, 1, 2), "(a) the bounds", TIME, y_scale="log"),
         Panel("[1/normalised time]", lines(1, 2, 3), "(b) without df2_max", TIME, y_range=(-4.0, 6.0)),
     ]
     return Claim(
-        place="Fig. 1",
-        statement="With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
+        "Fig. 1",
+        "With noise, too, the means come as df2_max >= Omega_1 >= Omega_2 >= df2/dx2.",
         assumes=ASSUMED,
         holds=in_order.all(),
         figures={f"{name}_mean_per_time": row for name, row in zip(RATES, means, strict=True)}
         | {"L_over_tracked_ratio": gains / (PHI2 + PHI3 / PHI1 * means[1:3])},
-        pictures=[Picture("andrieu2009-fig-1", title, panels)],
+        picture=Picture(
+            "andrieu2009-fig-1",
+            "andrieu2009, Fig. 1: local incremental rate of f2 and its estimates (dots: means over seeds)",
+            panels,
+        ),
     )
 
 
 # --- Fig. 2: the error of eta2 that each observer leaves, its bias and its spread ---
 
 
-def share_in_order(rms: np.ndarray) -> float:
+def share_in_order(rms: Array) -> float:
     """Return the share of the seeds in which constant > updated > updated and homogeneous."""
     return (np.diff(rms, axis=0) < 0.0).all(axis=0).mean()
 
@@ -301,13 +288,8 @@ def figure_2(study: Study) -> Claim:
     """Judge the estimation errors."""
     rms, loud = (rms_by_kind(study.run, replays) for replays in (study.nominal, study.loud))
     share, t = share_in_order(rms), study.run.t
-    remark = (
-        "Initial values are not given: the plant's and the observers' are drawn from M_eta for each seed, and the "
-        "error is counted from t = 5. The noise is a new value every 10 ms, running straight in between. The "
-        "third is best because of Omega_2, not of the homogeneous correction (see the claim on the correction)."
-    )
 
-    def by_kind(values: np.ndarray) -> dict[str, float]:
+    def by_kind(values: Array) -> dict[str, float]:
         return dict(zip(KINDS, values, strict=True))
 
     curves = [study.nominal[kind].eta2_error[:, 0] for kind in KINDS]
@@ -318,14 +300,15 @@ def figure_2(study: Study) -> Claim:
         Panel("eta2 error [-]", part, f"({letter})", TIME, y_range=(-0.3, 0.8))
         for letter, part in zip("abc", lines, strict=True)
     ]
-    title = "andrieu2009, Fig. 2: error of eta2 given by each observer (one seed; black in (a): running mean over 1)"
     return Claim(
-        place="Fig. 2",
-        statement="The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
+        "Fig. 2",
+        "The observer with Omega_2 and homogeneity gives the best estimate of eta2, the updated gain with "
         "Omega_1 the second, the constant gain the worst.",
         assumes=ASSUMED,
         holds=share >= MIN_SEEDS,
-        conditions=remark,
+        conditions="Initial values are not given: the plant's and the observers' are drawn from M_eta for each seed, "
+        "and the error is counted from t = 5. The noise is a new value every 10 ms, running straight in between. The "
+        "third is best because of Omega_2, not of the homogeneous correction (see the claim on the correction).",
         figures={
             "rms_error_eta2": by_kind(rms.mean(axis=1)),
             "rms_error_eta2_standard_deviation": by_kind(rms.std(axis=1, ddof=1)),
@@ -333,7 +316,11 @@ def figure_2(study: Study) -> Claim:
             "rms_error_eta2_with_10_percent_noise": by_kind(loud.mean(axis=1)),
             "share_of_seeds_in_order_with_10_percent_noise": share_in_order(loud),
         },
-        pictures=[Picture("andrieu2009-fig-2", title, panels)],
+        picture=Picture(
+            "andrieu2009-fig-2",
+            "andrieu2009, Fig. 2: error of eta2 given by each observer (one seed; black in (a): running mean over 1)",
+            panels,
+        ),
     )
 
 
@@ -341,15 +328,15 @@ def bias(study: Study) -> Claim:
     """Judge the order of the biases in Fig. 2."""
     noisy, quiet = (by_window(study, replays, "eta2_error") for replays in (study.nominal, study.quiet))
     return Claim(
-        place="Section 3.1, bias in Fig. 2",
-        statement="The larger an observer's estimate of the rate, the larger the bias of its error.",
+        "Section 3.1, bias in Fig. 2",
+        "The larger an observer's estimate of the rate, the larger the bias of its error.",
         assumes=ASSUMED,
         holds=np.all(np.diff([noisy, quiet], axis=1) <= 0.0),
         figures={"bias_eta2": noisy, "bias_eta2_without_noise": quiet},
     )
 
 
-def bias_left(study: Study) -> np.ndarray:
+def bias_left(study: Study) -> Array:
     """Return the share of the bias that is left where the observers know hbar, (3 observers, 4 windows)."""
     exact, nominal = (by_window(study, replays, "eta2_error") for replays in (study.exact, study.nominal))
     return np.abs(exact / nominal)
@@ -359,8 +346,8 @@ def bias_of_constant_gain(study: Study) -> Claim:
     """Judge the cause of the constant gain's bias."""
     shares_left = bias_left(study)[0]
     return Claim(
-        place="Section 3.1, bias of the constant gain",
-        statement="The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
+        "Section 3.1, bias of the constant gain",
+        "The bias of the observer with constant gain in Fig. 2 is due to the error in hbar.",
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, shares_left < HALF, strict=True)),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
@@ -375,8 +362,8 @@ def bias_of_updated_gains(study: Study) -> Claim:
     due = dict(zip(WINDOW_NAMES, np.all(shares_left < HALF, axis=0), strict=True))
     windows, other_windows = (", ".join(name for name in due if due[name] == is_due) for is_due in (True, False))
     return Claim(
-        place="Section 3.1, bias of the updated gains",
-        statement="The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
+        "Section 3.1, bias of the updated gains",
+        "The biases of the observers with updated gain in Fig. 2 are due to the error in hbar.",
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=due,
         otherwise=f"Less than half remains for both in {windows}; not in {other_windows}, where "
@@ -405,8 +392,8 @@ def spread(study: Study) -> Claim:
         f"{ratio:.0f} times that at small u, since eta2 follows more steeply from x2 there."
     )
     return Claim(
-        place="Section 3.1, standard deviation in Fig. 2",
-        statement="The larger an observer's estimate of the rate, the more its error scatters.",
+        "Section 3.1, standard deviation in Fig. 2",
+        "The larger an observer's estimate of the rate, the more its error scatters.",
         assumes=ASSUMED,
         holds=in_window >= STRONG and overall > 0.0,
         conditions="" if overall >= STRONG else remark,
@@ -434,8 +421,8 @@ def correction(study: Study) -> Claim:
     rms, rms_linear, rms_inside = (rms_late(run, part.eta2_error).mean() for part in (nominal, linear, bounded))
     difference = np.abs(nominal.eta2_error - linear.eta2_error)[late].max()
     return Claim(
-        place="Section 3.1, the homogeneous correction",
-        statement="In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
+        "Section 3.1, the homogeneous correction",
+        "In Fig. 2 the homogeneous correction is linear for all that matters: the third observer is the best "
         "because of Omega_2.",
         assumes=ASSUMED,
         holds=difference < 0.01 * rms,
@@ -471,9 +458,8 @@ def simple_copy(study: Study) -> Claim:
     total = np.abs(errors.sum(axis=0))
     share_left = np.median(total[end] / total[start])
     return Claim(
-        place="Footnote 1",
-        statement="A model of the plant that just runs along feels no noise, but how fast its error fades is not ours "
-        "to choose.",
+        "Footnote 1",
+        "A model of the plant that just runs along feels no noise, but how fast its error fades is not ours to choose.",
         holds=abs(share_left - np.exp(-0.02 * 10.0)) < 0.01 and min(by_noise.values()) > SEEN_NOISE * best_rms,
         figures={
             "rms_change_by_noise_eta2": by_noise,

@@ -8,16 +8,18 @@ example.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar, signed_power
 from cmg_mj.observers.high_gain import updated_gain
+from cmg_mj.papers.recorded import runge_kutta
 
 # --- The correction term: a vector field K that is homogeneous in the bi-limit, for any dimension ---
 
@@ -115,19 +117,11 @@ def _bounds_of_22(v: Sequence[float]) -> dict[int, float]:
 
 # --- The observer ---
 
-Signals = tuple[Scalar, ...]
-"""Some signals: floats for one world, arrays (n_worlds,) for many."""
+Signals = Any
+"""Some signals, a tuple or an array of them: floats for one world, arrays (n_worlds,) for many."""
 
 Function = Callable[[Any, Signals, Signals], Scalar]
 """(u, y, (x_2, ..., x_i)) -> a number: f_i. Omega takes (x_2, ..., x_n)."""
-
-
-class State(NamedTuple):
-    """The estimate x_1..x_n, the gain, and the measurement of the last sample."""
-
-    x: Signals
-    L: Scalar
-    y: Signals
 
 
 @dataclass(frozen=True)
@@ -163,42 +157,25 @@ class UpdatedHighGain:
     phi3: float
     saturate: Callable[[Signals, Signals], tuple[Signals, Signals]] = lambda y, x: (y, x)
 
-    def init(self, y: Signals, x: Signals) -> State:
-        """Return the state at the first sample.
-
-        Args:
-            y: Measurement: the output, and after it whatever other measured signals f and Omega take.
-            x: Estimate to start from, x_1..x_n.
-
-        Returns:
-            The state, with L = phi2.
-        """
-        zero = 0.0 * y[0]
-        return State(tuple(x_i + zero for x_i in x), self.phi2 + zero, y)
-
-    def step(self, state: State, y: Signals, u: Any) -> State:
+    def step(self, x: np.ndarray, L: Scalar, y_before: Signals, y: Signals, u: Any) -> tuple[np.ndarray, Scalar]:
         """Advance by one sample period.
 
         Args:
-            state: The state at sample k-1.
-            y: Measurement at sample k; it ran straight since sample k-1.
-            u: Known inputs, held since sample k-1.
+            x: Estimate at sample k-1, (n, ...).
+            L: The gain there.
+            y_before: Measurement there.
+            y: Measurement at sample k; it ran straight since.
+            u: Known inputs, held since.
 
         Returns:
-            The state at sample k.
+            Estimate and gain at sample k.
         """
-        h, (x, L, y_before) = self.dt, state
         middle = tuple(0.5 * (p + q) for p, q in zip(y_before, y, strict=True))
-        Omega = self.Omega(u, *self.saturate(y_before, x[1:]))
-        L_middle = updated_gain(L, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
-        L_end = updated_gain(L_middle, Omega, 0.5 * h, self.phi1, self.phi2, self.phi3)
-
-        p = self.slope(x, L, y_before, u)
-        q = self.slope(_advance(x, 0.5 * h, p), L_middle, middle, u)
-        r = self.slope(_advance(x, 0.5 * h, q), L_middle, middle, u)
-        s = self.slope(_advance(x, h, r), L_end, y, u)
-        mean = tuple(p_i + 2.0 * (q_i + r_i) + s_i for p_i, q_i, r_i, s_i in zip(p, q, r, s, strict=True))
-        return State(_advance(x, h / 6.0, mean), L_end, y)
+        held = self.Omega(u, *self.saturate(y_before, x[1:])), 0.5 * self.dt, self.phi1, self.phi2, self.phi3
+        L_middle = updated_gain(L, *held)
+        L_end = updated_gain(L_middle, *held)
+        stages: dict[float, tuple[Scalar, Signals]] = {0.0: (L, y_before), 0.5: (L_middle, middle), 1.0: (L_end, y)}
+        return runge_kutta(lambda share, z: np.array(self.slope(z, *stages[share], u)), x, self.dt), L_end
 
     def follow(
         self, y: Signals, x: Signals, u: Sequence[Any] | None = None, gain: Scalar = 1.0
@@ -206,7 +183,8 @@ class UpdatedHighGain:
         """Estimate from all samples.
 
         Args:
-            y: Measurements, each (n_times, ...).
+            y: Measurements, each (n_times, ...): the output, and after it whatever other measured signals f and Omega
+                take.
             x: Estimate to start from, x_1..x_n.
             u: Known inputs held from each sample on, (n_times,).
             gain: Gain at the start over phi2.
@@ -214,11 +192,14 @@ class UpdatedHighGain:
         Returns:
             Estimates (n, n_times, ...) and gains (n_times, ...).
         """
-        state = self.init(tuple(signal[0] for signal in y), x)
-        states = [state._replace(L=gain * state.L)]
-        for k in range(1, len(y[0])):
-            states.append(self.step(states[-1], tuple(signal[k] for signal in y), None if u is None else u[k - 1]))
-        return np.moveaxis(np.array([state.x for state in states]), 1, 0), np.array([state.L for state in states])
+        samples = list(zip(*y, strict=True))
+        zero = 0.0 * samples[0][0]
+        estimates, gains = [np.array([x_i + zero for x_i in x])], [gain * (self.phi2 + zero)]
+        for k, (before, now) in enumerate(itertools.pairwise(samples)):
+            estimate, L = self.step(estimates[-1], gains[-1], before, now, None if u is None else u[k])
+            estimates.append(estimate)
+            gains.append(L)
+        return np.moveaxis(np.array(estimates), 1, 0), np.array(gains)
 
     def slope(self, x: Signals, L: Scalar, y: Signals, u: Any) -> Signals:
         """Return the right-hand side of (7)."""
@@ -230,8 +211,3 @@ class UpdatedHighGain:
             f_i = self.f[i](u, limited_y, limited_x[:i]) if i else self.f[0](u, y, ())
             slopes.append(f_i + (x[i + 1] + scale * K_i if i + 1 < len(x) else scale * K_i))
         return tuple(slopes)
-
-
-def _advance(x: Signals, span: float, slope: Signals) -> Signals:
-    """Return the point x + span slope."""
-    return tuple(x_i + span * slope_i for x_i, slope_i in zip(x, slope, strict=True))

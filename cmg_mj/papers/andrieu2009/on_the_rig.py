@@ -42,25 +42,25 @@ def comparison_claim(results: dict[str, Result]) -> Claim:
     top = 1.1 * max(np.nanmax(values) for values in errors.values())
     lines = [Line(np.arange(worlds), values, label, "o") for label, values in errors.items()]
     panel = Panel("velocity RMS error\n[rad/s]", lines, x_label="world", y_range=(0.0, top))
-    title = "andrieu2009, on the six-body rig: velocity RMS error in the closed loop, push_recovery, e = 0.5 deg"
-    remark = (
-        "The scenario push_recovery, e = 0.5 deg, default noise; parameters tuned on the gyro's "
-        "loop with other seeds (docs/studies/tune_high_gain.py), for d_inf = 0 as well. Like (10) and (11) it takes "
-        "the bias for a tilting torque."
-    )
     return Claim(
-        place="On the rig",
-        statement="The observer, as `high_gain`, holds the scissored pair through the push.",
+        "On the rig",
+        "The observer, as `high_gain`, holds the scissored pair through the push.",
         assumes=PUSH_RECOVERY,
         holds=standing_counts["high_gain"] == worlds,
-        conditions=remark,
+        conditions="The scenario push_recovery, e = 0.5 deg, default noise; parameters tuned on the gyro's "
+        "loop with other seeds (docs/studies/tune_high_gain.py), for d_inf = 0 as well. Like (10) and (11) it takes "
+        "the bias for a tilting torque.",
         figures={
             "stood_count": standing_counts,
             VELOCITY: {label: result.mean(VELOCITY) for label, result in results.items()},
             TILT: {label: result.mean(TILT) for label, result in results.items()},
             "high_gain_less_other_rad_s": excess,
         },
-        pictures=[Picture("andrieu2009-rig", title, [panel])],
+        picture=Picture(
+            "andrieu2009-rig",
+            "andrieu2009, on the six-body rig: velocity RMS error in the closed loop, push_recovery, e = 0.5 deg",
+            [panel],
+        ),
         is_ours=True,
     )
 
@@ -78,8 +78,8 @@ def idle_claim(result: Result) -> Claim:
     largest_L = np.max(gains)
     fastest = np.abs(np.roots([1.0, observer.l1, observer.l1 * observer.l2])).max()
     return Claim(
-        place="On the rig, the gain",
-        statement="On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
+        "On the rig, the gain",
+        "On the scissored pair, whose f2 hardly depends on the rate, the update of the gain is idle.",
         assumes=PUSH_RECOVERY,
         holds=largest_L < 1.05 * observer.phi2,
         figures={

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from cmg_mj.core.arrays import Scalar, signed_power
 from cmg_mj.papers.andrieu2009 import bioreactor
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, UpdatedHighGain
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 PLAIN, UPDATED, HOMOGENEOUS = "constant gain, linear", "updated gain, linear", "updated gain, homogeneous"
@@ -54,7 +54,7 @@ LAST = 14.0
 """-ln of the share of the time of existence that is left at the end: about a millionth."""
 
 
-def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+def solution(p: float, x2: float, share_left: Array | float) -> tuple[Array, Array]:
     """Solve x2' = x2^(1+p), x1(0) = 0 for x1 and x2, in closed form.
 
     Args:
@@ -68,7 +68,7 @@ def solution(p: float, x2: float, share_left: np.ndarray | float) -> tuple[np.nd
     return x1, (p * end * np.asarray(share_left)) ** (-1.0 / p)
 
 
-def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) -> tuple[np.ndarray, np.ndarray]:
+def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) -> tuple[Array, Array]:
     """Let (7), (8) for (1) with g = 0, u = 0 follow a solution to its end, over s = -ln of the share left.
 
     Args:
@@ -82,7 +82,7 @@ def escape(p: float, x2: float, x2_hat: float = 0.0, tolerance: float = 1e-6) ->
     """
     follower, end = system_1(HOMOGENEOUS, p, g_is_0=True), x2**-p / p
 
-    def slope(s: float, z: np.ndarray) -> list[float]:
+    def slope(s: float, z: Array) -> list[float]:
         share_left = math.exp(-s)
         y, L = (float(solution(p, x2, share_left)[0]), 0.0), math.exp(z[2])
         first, second = follower.slope((z[0], z[1]), L, y, None)
@@ -116,19 +116,15 @@ def no_observer_beyond_1() -> Claim:
         )
         for letter, (p, escapes) in zip("ab", runs.items(), strict=True)
     ]
-    title = "andrieu2009, section 2.1: relative error of x2 along solutions of (1) that escape"
-    one_observer = (
-        "One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, without input, "
-        "started at the measured x1 and x2_hat = 0. The statement is about all observers and is proved "
-        "elsewhere (Astolfi and Praly 2006). This example shows the obstacle, and is no proof."
-    )
     return Claim(
-        place="Section 2.1",
-        statement="Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution "
+        "Section 2.1",
+        "Once p exceeds 1, and with u = 0, no observer whatever can be sure to find x2 before the solution "
         "of (1) ends.",
         is_general=True,
         holds=max(ends[INSIDE]) < FOUND and misses[-1],
-        conditions=one_observer,
+        conditions="One observer, (7) and (8) with d_inf = 0.5, l = (2, 1), phi1 = 0.5, phi2 = 2, phi3 = 1, g = 0, "
+        "without input, started at the measured x1 and x2_hat = 0. The statement is about all observers and is proved "
+        "elsewhere (Astolfi and Praly 2006). This example shows the obstacle, and is no proof.",
         figures={
             "x2_at_start": STARTS,
             "relative_error_of_x2_at_the_end_by_p": ends,
@@ -136,7 +132,11 @@ def no_observer_beyond_1() -> Claim:
             "output_moves_by_p_1_5": [start ** (1.0 - BEYOND) / (BEYOND - 1.0) for start in STARTS],
             "missed_count": sum(misses),
         },
-        pictures=[Picture("andrieu2009-escape", title, panels)],
+        picture=Picture(
+            "andrieu2009-escape",
+            "andrieu2009, section 2.1: relative error of x2 along solutions of (1) that escape",
+            panels,
+        ),
     )
 
 
@@ -167,7 +167,7 @@ class Column(NamedTuple):
     """Amplitudes of the same in the sense of (4), where the system has y for x1."""
 
 
-def follow(kind: str, columns: Sequence[Column]) -> tuple[np.ndarray, np.ndarray]:
+def follow(kind: str, columns: Sequence[Column]) -> tuple[Array, Array]:
     """Let an observer follow x1 = a sin t, which solves (1) for the right u, known to the observer.
 
     Args:
@@ -200,9 +200,6 @@ def theorem_1() -> Claim:
     largest = {kind: np.nanmax(L) for kind, L in gains.items()}
     balls = errors[HOMOGENEOUS][TIMES > 5.0, n:].max(axis=0)
     shrinks = all(a > 5.0 * b for a, b in itertools.pairwise(balls))
-    by_simulation = (
-        "By simulation, for one p, one g and one solution, with phi1 = 0.5, phi2 = 2, phi3 = 1, l = (2, 1), b = 0.5."
-    )
     styles = zip(errors.items(), ("--", "-", "-"), strict=True)
     error_lines = [Line(TIMES, error[:, n - 1], kind, style) for (kind, error), style in styles]
     gain_lines = [Line(TIMES, L[:, -1], kind) for kind, L in gains.items()]
@@ -211,21 +208,25 @@ def theorem_1() -> Claim:
         Panel("|error of x2| [-]", error_lines, "(a) from an error of 1000", time, y_scale="log", y_range=(1e-8, 1e6)),
         Panel("gain L [-]", gain_lines, "(b) its gain", time, y_range=(0.0, top)),
     ]
-    title = "andrieu2009, Theorem 1 on system (1): |error of x2| after the largest errors at the start"
     return Claim(
-        place="Section 2, Theorem 1 on system (1)",
-        statement="For p in [0, 1) the observer (7), (8) converges along bounded solutions of (1), to a ball that "
+        "Section 2, Theorem 1 on system (1)",
+        "For p in [0, 1) the observer (7), (8) converges along bounded solutions of (1), to a ball that "
         "shrinks with the disturbances.",
         is_general=True,
         holds=failures[HOMOGENEOUS] == 0 and shrinks,
-        conditions=by_simulation,
+        conditions="By simulation, for one p, one g and one solution, with phi1 = 0.5, phi2 = 2, phi3 = 1, l = (2, 1), "
+        "b = 0.5.",
         figures={
             "final_error_x2": ends,
             "largest_gain": largest,
             "failed_count": failures,
             "error_bound_by_disturbance": dict(zip(AMPLITUDES, balls, strict=True)),
         },
-        pictures=[Picture("andrieu2009-theorem-1", title, panels)],
+        picture=Picture(
+            "andrieu2009-theorem-1",
+            "andrieu2009, Theorem 1 on system (1): |error of x2| after the largest errors at the start",
+            panels,
+        ),
     )
 
 
@@ -240,7 +241,7 @@ SOLUTIONS = (1.0, 2.0, 4.0)
 """Amplitudes of x1."""
 
 
-def respond(columns: Sequence[Column]) -> tuple[np.ndarray, np.ndarray]:
+def respond(columns: Sequence[Column]) -> tuple[Array, Array]:
     """Return |L^-1 e| with the matrix of (10), and L, each (n_times, n_columns)."""
     (e1, e2), L = follow(HOMOGENEOUS, columns)
     return np.hypot(e1 / L**B, e2 / L ** (1.0 + B)), L
@@ -260,8 +261,8 @@ def equations_11_12_claims() -> list[Claim]:
     one_observer = "By simulation of system (1), p = 0.5, x1 = sin t, one observer: see Theorem 1."
     return [
         Claim(
-            place="Section 2, (11)",
-            statement="The scaled error is bounded by a function of its start that fades, plus one of the disturbances "
+            "Section 2, (11)",
+            "The scaled error is bounded by a function of its start that fades, plus one of the disturbances "
             "that is zero at zero.",
             is_general=True,
             holds=shrink and ends.max() < 1e-5,
@@ -272,9 +273,8 @@ def equations_11_12_claims() -> list[Claim]:
             },
         ),
         Claim(
-            place="Section 2, (12)",
-            statement="L is bounded by 4 phi2, a function of the start that fades, and one of the disturbances, Gamma "
-            "and x.",
+            "Section 2, (12)",
+            "L is bounded by 4 phi2, a function of the start that fades, and one of the disturbances, Gamma and x.",
             is_general=True,
             holds=relative_spread < 1e-3 and np.isfinite(peaks).all() and np.isfinite(by_solution).all(),
             conditions=one_observer,

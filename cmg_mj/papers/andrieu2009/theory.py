@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -16,7 +15,7 @@ from cmg_mj.observers.high_gain import updated_gain
 from cmg_mj.papers.andrieu2009 import bioreactor
 from cmg_mj.papers.andrieu2009.bioreactor import B, P
 from cmg_mj.papers.andrieu2009.observer import BiLimitCorrection, largest_b, list_violations, weights
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.recorded import largest_size
 
 # --- Sections 1 and 2: the increments of f2 of system (1), their bounds (2), (3), and the exponent in (6) ---
@@ -37,14 +36,14 @@ def linear_increments() -> Claim:
     """Judge (2)."""
     quotient = increments_of_2(0.0)
     return Claim(
-        place="Section 1, (2)",
-        statement="For p = 0 the increments of f2 are bounded by |g(x1) + 1| |x2 - x2_hat|.",
+        "Section 1, (2)",
+        "For p = 0 the increments of f2 are bounded by |g(x1) + 1| |x2 - x2_hat|.",
         holds=quotient <= 1.0 + 1e-9,
         figures={"worst_quotient": quotient, "worst_quotient_p_0_1": increments_of_2(0.1)},
     )
 
 
-def worst_quotient(p: float, size: float, bound: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> float:
+def worst_quotient(p: float, size: float, bound: Callable[[Array, Array], Array]) -> float:
     """Return the worst quotient of an increment of x2^(1+p) and its bound, over both signs and sizes up to one.
 
     With g = 0: |g| |x2 - x2_hat| adds to both sides at most.
@@ -69,8 +68,8 @@ def increments() -> Claim:
         for p in (0.1, 0.5, 0.9, 1.0, 1.5, 2.0)
     }
     return Claim(
-        place="Section 1, (3)",
-        statement="For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) "
+        "Section 1, (3)",
+        "For 0 < p < 1 the increments of f2 = g(x1) x2 + x2^(1+p) + u are bounded by (|g| + (1+p) "
         "|x2_hat|^p) |x2 - x2_hat| + |x2 - x2_hat|^(1+p).",
         is_general=True,
         holds=max(quotient for p, quotient in quotients.items() if p < 1.0) <= 1.0 + 1e-9,
@@ -100,8 +99,8 @@ def exponent_of_6() -> Claim:
     )
     is_misprint = any(b > 2.0 * a for a, b in printed.values())
     return Claim(
-        place="Section 2, the exponent of (6)",
-        statement="For system (1), (3) has the form (6) with d_inf = p, Gamma = |g| + 1 + p and v_2 = p.",
+        "Section 2, the exponent of (6)",
+        "For system (1), (3) has the form (6) with d_inf = p, Gamma = |g| + 1 + p and v_2 = p.",
         is_general=True,
         holds=max(quotients.values()) <= 1.0 + 1e-9,
         conditions=(corrected if is_misprint else "") + "For all p in (0, 1), of which three were tried.",
@@ -122,8 +121,8 @@ def scaling_conditions() -> Claim:
         for n, i, j, b, d in itertools.product(range(4), repeat=5)
     )
     return Claim(
-        place="Section 4.3, (21), (22)",
-        statement="Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
+        "Section 4.3, (21), (22)",
+        "Every small enough b satisfies (21) and (22), whichever d_inf and v_j Theorem 1 allows.",
         holds=is_a_bound_on_b and math.isclose(bound, 1.0 / P - 1.0, rel_tol=1e-9),
         figures={"b": B, "largest_b": bound, "violated_count": len(list_violations(2, P, B, (P,)))},
     )
@@ -134,10 +133,10 @@ def tracking_error(rate: float) -> tuple[float, float]:
     dt, phi1, phi2, phi3 = 0.01, 0.5, 1.0, 1.0
     t = np.arange(0.0, 20.0 + 4.0 * math.pi / rate, dt)
     Omega = 2.0 + np.sin(rate * t)
-    gains = [phi2]
-    for value in Omega[:-1].tolist():
-        gains.append(updated_gain(gains[-1], value, dt, phi1, phi2, phi3))
-    L = np.array(gains)
+    gains = itertools.accumulate(
+        Omega[:-1].tolist(), lambda L, held: updated_gain(L, held, dt, phi1, phi2, phi3), initial=phi2
+    )
+    L = np.array([*gains])
     return np.abs(L - phi2 - phi3 / phi1 * Omega)[t > 20.0].max(), (L - phi2).min()
 
 
@@ -147,8 +146,8 @@ def gain_tracking() -> Claim:
     errors, least = zip(*map(tracking_error, rates), strict=True)
     is_proportional = all(1.6 < a / b < 2.4 for a, b in itertools.pairwise(errors))
     return Claim(
-        place="Section 2.2, (13)",
-        statement="L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 "
+        "Section 2.2, (13)",
+        "L tracks phi2 + (phi3/phi1) Omega up to an error proportional to |Omega'|, and from L(0) >= phi2 "
         "stays at or above phi2.",
         is_general=True,
         assumes={"signal": "Omega = 2 + sin(w t)", "gains": "phi1 = 0.5, phi2 = 1, phi3 = 1"},
@@ -170,17 +169,14 @@ def theorem_2() -> Claim:
         ends[f"n={n}, d_inf={d_inf:g}"] = chain_errors(K, (1e-3, 1.0, 1e3))
         if d_inf:
             limits[f"n={n}, d_inf={d_inf:g}"] = [limits_error(K, scale) for scale in (1e4, 1e8, 1e12)]
-    by_simulation = (
-        "Convergence is shown by simulation from random errors, the construction of W for two dimensions only, by the "
-        "claim on (19) and (20)."
-    )
     return Claim(
-        place="Section 4.2, Theorem 2 (and Definition 1)",
-        statement="There is a K, homogeneous in the bi-limit, with which the error of a chain of integrators "
+        "Section 4.2, Theorem 2 (and Definition 1)",
+        "There is a K, homogeneous in the bi-limit, with which the error of a chain of integrators "
         "converges, for any n and any d_inf in [0, 1/(n-1)).",
         is_general=True,
         holds=max(ends.values()) < 1e-3 and all(a > b > c for a, b, c in limits.values()),
-        conditions=by_simulation,
+        conditions="Convergence is shown by simulation from random errors, the construction of W for two dimensions "
+        "only, by the claim on (19) and (20).",
         figures={
             "largest_final_error_ratio": ends,
             "deviation_from_limits_ratio": limits,
@@ -222,7 +218,7 @@ def chain_errors(correction: BiLimitCorrection, sizes: Sequence[float]) -> float
     """
     rng, largest_ratio = np.random.default_rng(0), 0.0
 
-    def slope(_: float, E: np.ndarray) -> list[float]:
+    def slope(_: float, E: Array) -> list[float]:
         *numbers, last = correction(float(E[0]))
         if not math.isfinite(last):  # LSODA would go on for ever
             raise OverflowError
@@ -256,7 +252,7 @@ MARGIN = 0.02
 """c1 and c2 must be at least so large, because the states tried leave some out."""
 
 
-def states(scales: np.ndarray = SCALES, angles: int = 120) -> np.ndarray:
+def states(scales: Array = SCALES, angles: int = 120) -> Array:
     """Return states on squares of all scales, (2, n), denser where s1 and s2 are nearly alike or one is small."""
     share = np.linspace(-1.0, 1.0, angles)
     shares = np.concatenate([share, np.geomspace(1e-3, 1.0, 40), 1.0 - np.geomspace(1e-3, 1.0, 40)])
@@ -305,10 +301,6 @@ class Lyapunov:
         """Return the integral of h."""
         return sum(np.abs(s) ** (power + 1.0) / (power + 1.0) for power in self.powers)
 
-    def E(self, s1: Scalar, s2: Scalar) -> tuple[Scalar, Scalar]:
-        """Return e1 and e2."""
-        return s1 / self.K.l[0], self.q1(s2)
-
     def W(self, s1: Scalar, s2: Scalar) -> Scalar:
         """Return W, (n,)."""
         first = self.H(s1) - self.H(s2) - self.h(s2) * (s1 - s2)
@@ -323,7 +315,7 @@ class Lyapunov:
         )
 
 
-def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: np.ndarray | None = None) -> tuple[float, float]:
+def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: Array | None = None) -> tuple[float, float]:
     """Try (19) and (20).
 
     Args:
@@ -339,7 +331,7 @@ def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: np.ndarray | None = 
     # Where s1 and s2 are nearer, W is rounding errors.
     distinct = np.abs(s1 - s2) > 1e-9 * np.maximum(np.abs(s1), np.abs(s2))
     s = s1[distinct], s2[distinct]
-    (e1, e2), (by_e1, by_e2), value = W.E(*s), W.gradient(*s), W.W(*s)
+    e1, e2, (by_e1, by_e2), value = s[0] / W.K.l[0], W.q1(s[1]), W.gradient(*s), W.W(*s)
     k1, k2 = W.K(e1)
     slopes = by_e1 * (e2 + k1), by_e2 * k2
     largest = sum(np.maximum((1.0 - spread) * part, (1.0 + spread) * part) for part in slopes)
@@ -348,22 +340,17 @@ def decay(W: Lyapunov, b: float, spread: float = 0.0, grid: np.ndarray | None = 
     return (-largest / bound).min(), (growth / value).min()
 
 
-class Pair(NamedTuple):
-    """The first K and W with which both hold, b, half of what (21) and (22) allow with v_2 = d_inf, and c1, c2."""
+def search(d_inf: float) -> tuple[Lyapunov, float, float, float] | None:
+    """Look for K and W with d_W = 2 + d_inf.
 
-    W: Lyapunov
-    b: float
-    c1: float
-    c2: float
-
-
-def search(d_inf: float) -> Pair | None:
-    """Look for K and W with d_W = 2 + d_inf."""
+    Returns:
+        The first W, with its K, with which both hold; b, half of what (21) and (22) allow with v_2 = d_inf; c1 and c2.
+    """
     b = min(1.0, 0.5 * largest_b(2, d_inf, (d_inf,)))
     for l1, sigma in itertools.product(L1, SIGMAS):
         W = Lyapunov(BiLimitCorrection((l1, 1.0), d_inf), sigma, 2.0 + d_inf)
         if min(decay(W, b, SPREAD)) > MARGIN:
-            return Pair(W, b, *decay(W, b, SPREAD, states(FINE)))
+            return W, b, *decay(W, b, SPREAD, states(FINE))
     return None
 
 
@@ -371,16 +358,16 @@ def equations_19_20() -> Claim:
     """Judge (19) and (20)."""
     pairs = {d_inf: pair for d_inf in DEGREES if (pair := search(d_inf)) is not None}
     return Claim(
-        place="Section 4.2, (19) and (20)",
-        statement="There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "
+        "Section 4.2, (19) and (20)",
+        "There are K and a proper W, homogeneous in the bi-limit, that satisfy (19) and (20) for all A(t) "
         "within (17) and the B of section 4.3.",
         is_general=True,
-        holds=len(pairs) == len(DEGREES) and all(min(pair.c1, pair.c2) > 0.0 for pair in pairs.values()),
+        holds=len(pairs) == len(DEGREES) and all(min(c1, c2) > 0.0 for _, _, c1, c2 in pairs.values()),
         conditions="For two dimensions, by numbers; a d_inf near its limit asks for a larger l1.",
         otherwise="For some d_inf none was found, which does not say that there is none.",
         figures={
-            "c1_by_d_inf": {d_inf: pair.c1 for d_inf, pair in pairs.items()},
-            "c2_by_d_inf": {d_inf: pair.c2 for d_inf, pair in pairs.items()},
-            "l1_by_d_inf": {d_inf: pair.W.K.l[0] for d_inf, pair in pairs.items()},
+            "c1_by_d_inf": {d_inf: c1 for d_inf, (_, _, c1, _) in pairs.items()},
+            "c2_by_d_inf": {d_inf: c2 for d_inf, (*_, c2) in pairs.items()},
+            "l1_by_d_inf": {d_inf: W.K.l[0] for d_inf, (W, *_) in pairs.items()},
         },
     )

@@ -15,7 +15,7 @@ from cmg_mj.papers.aranovskiy2020 import (
 )
 from cmg_mj.papers.claim import Section, section
 
-SECTIONS: list[Section] = [
+SECTIONS = [
     section("two pairs at right angles", 2.0, two_axes.one_axis_at_a_time),
     section("constants and reduced model", 0.2, model.claims),
     section("linearisation", 0.1, model.linearisation, model.law_equilibria),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from cmg_mj.core.arrays import signed_power
 from cmg_mj.observers import Measurement, make_observer
 from cmg_mj.papers.aranovskiy2020.paper import TABLE_2, printed_model
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.pair import DT, replay_at_rest
 from cmg_mj.papers.recorded import largest_size, rms
 from cmg_mj.view.plots.figure import Line, Panel, Picture
@@ -19,7 +18,7 @@ from cmg_mj.view.plots.figure import Line, Panel, Picture
 ALPHAS = (0.55, 0.7, 0.85, 1.0)
 
 
-def rates_at_rest(alpha: float, dt: float, span_s: float, **start: float) -> np.ndarray:
+def rates_at_rest(alpha: float, dt: float, span_s: float, **start: float) -> Array:
     """Run the bench's (11) at rest from a wrong state, without noise: sizes of its rate, (n_samples,) [rad/s]."""
     observer, measurement = make_observer("homogeneous", dt, printed_model(), alpha=alpha), Measurement(0.0, 0.0)
     state, rates = observer.init(measurement)._replace(**start), []
@@ -44,15 +43,15 @@ SEEN = 1e-3
 class Decay(NamedTuple):
     """The course of an error that fades."""
 
-    decades: np.ndarray
+    decades: Array
     """Powers of ten by which its homogeneous size has fallen, (n,)."""
-    time_s: np.ndarray
+    time_s: Array
     """Times of these sizes, (n,) [s]."""
-    rate: np.ndarray
+    rate: Array
     """The rate's error then, of 1 at first, (n,) [rad/s]."""
 
     @property
-    def turns(self) -> np.ndarray:
+    def turns(self) -> Array:
         """Changes of the sign of the rate's error: rows of `time_s`, (n_turns,)."""
         return np.flatnonzero(np.diff(np.sign(self.rate)))
 
@@ -82,7 +81,7 @@ def decay(alpha: float) -> Decay:
     """
     k1, k2, _ = TABLE_2["homogeneous"].values()
 
-    def slope(state: np.ndarray) -> np.ndarray:
+    def slope(state: Array) -> Array:
         z1, z2, log_r, _ = state.tolist()
         f1, f2 = z2 - k1 * signed_power(z1, alpha), -k2 * signed_power(z1, 2.0 * alpha - 1.0)
         fall = z1 * f1 + signed_power(z2, 2.0 / alpha - 1.0) * f2 / alpha
@@ -102,7 +101,7 @@ def decay(alpha: float) -> Decay:
     return Decay(-lowest / math.log(10.0), time, np.exp(alpha * log_r) * z2)
 
 
-def time_below(times: np.ndarray, rate: np.ndarray) -> float:
+def time_below(times: Array, rate: Array) -> float:
     """Return the time from which a rate stays below `SEEN` [s]."""
     return float(times[np.flatnonzero(np.abs(rate) > SEEN)[-1] + 1])
 
@@ -120,8 +119,8 @@ def finite_time() -> Claim:
     equation_s = time_below(printed.time_s, printed.rate)
     lines = [Line(d.time_s[::5], 10.0 ** (-d.decades[::5]), f"alpha = {alpha:g}") for alpha, d in decays.items()]
     return Claim(
-        place="After (11), finite time",
-        statement="Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
+        "After (11), finite time",
+        "Were it not for the replaced x2 and sin(x1), the error would converge to the origin in finite time.",
         is_general=True,
         holds=all(math.isfinite(end) == (alpha < 1.0) for alpha, end in ends.items())
         and factor_error < 0.02
@@ -133,13 +132,11 @@ def finite_time() -> Claim:
             "time_of_a_half_turn_by_the_one_before": {alpha: d.shrink_factor for alpha, d in decays.items()},
             "fallen_to_a_thousandth_after_s": {"observer": observer_s, "equation": equation_s},
         },
-        pictures=[
-            Picture(
-                "aranovskiy2020-finite-time",
-                "aranovskiy2020, (11) without bias and noise: how its error fades from 1 rad/s",
-                [Panel("homogeneous size of the error", lines, y_scale="log")],
-            )
-        ],
+        picture=Picture(
+            "aranovskiy2020-finite-time",
+            "aranovskiy2020, (11) without bias and noise: how its error fades from 1 rad/s",
+            [Panel("homogeneous size of the error", lines, y_scale="log")],
+        ),
     )
 
 
@@ -157,7 +154,7 @@ SEEN_RAD_S = 0.01
 """Biases of the rate above this one are compared with the closed form by their ratio, those below by the difference."""
 
 
-def errors_at_rest(alpha: float, y1: np.ndarray) -> np.ndarray:
+def errors_at_rest(alpha: float, y1: Array) -> Array:
     """Return the RMS of the rate estimated at rest, (n_worlds,) [rad/s], from y1, (n_ticks, n_worlds) [rad]."""
     observer = make_observer("homogeneous", DT, printed_model(), alpha=alpha)
     return rms(replay_at_rest(observer, y1).x2[len(y1) // 2 :])
@@ -188,9 +185,16 @@ def vicinity(seed: int = SEED) -> Claim:
     relative_difference = max(abs(x / b - 1.0) for x, b in pairs if b > SEEN_RAD_S)
     difference = max(abs(x - b) for x, b in pairs if b <= SEEN_RAD_S)
     slopes = {a: np.polyfit(np.log(NOISES_RAD), np.log(error), 1)[0] for a, error in by_noise.items()}
+    biased_lines, noisy_lines = [], []
+    for i, alpha in enumerate(SETTLING, 1):
+        label = f"alpha = {alpha:g}"
+        biased_lines.append(Line(BIASES_DEG, by_bias[alpha], label, "o", color=i))
+        biased_lines.append(Line(BIASES_DEG, bounds[alpha], color=i, width=0.8))
+        noisy_lines.append(Line(np.degrees(NOISES_RAD), by_noise[alpha], label, "o-", color=i))
+    e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
     return Claim(
-        place="After (11), the vicinity",
-        statement="For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
+        "After (11), the vicinity",
+        "For s^2 + k2 s + k1 Hurwitz and alpha in (1/2, 1] the error converges to a vicinity of the origin.",
         is_general=True,
         assumes={"e": "0.125 to 2 deg", "noise": "0.0005 to 0.008 rad", "control rate": f"{1.0 / DT:g} Hz"},
         holds=converges and relative_difference < 0.01 and difference < 0.1 * SEEN_RAD_S and min(slopes.values()) > 0.5,
@@ -208,28 +212,17 @@ def vicinity(seed: int = SEED) -> Claim:
             "rate_error_by_noise_rad_s": by_noise,
             "exponent_of_noise": slopes,
         },
-        pictures=[_vicinity_picture(by_bias, bounds, by_noise)],
-    )
-
-
-def _vicinity_picture(
-    by_bias: Mapping[float, np.ndarray], bounds: Mapping[float, np.ndarray], by_noise: Mapping[float, np.ndarray]
-) -> Picture:
-    biased, noisy = [], []
-    for i, alpha in enumerate(SETTLING, 1):
-        label = f"alpha = {alpha:g}"
-        biased.append(Line(BIASES_DEG, by_bias[alpha], label, "o", color=i))
-        biased.append(Line(BIASES_DEG, bounds[alpha], color=i, width=0.8))
-        noisy.append(Line(np.degrees(NOISES_RAD), by_noise[alpha], label, "o-", color=i))
-    e, sigma = "equilibrium bias e [deg]", "standard deviation of y1's noise [deg]"
-    return Picture(
-        "aranovskiy2020-vicinity",
-        "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
-        [
-            Panel("rate error [rad/s]", biased, "no noise; lines: closed form; above: chatter", e, "log", "log"),
-            Panel("RMS rate error\n[rad/s]", noisy, "with noise, no bias", sigma, "log", "log"),
-        ],
-        share_x=False,
+        picture=Picture(
+            "aranovskiy2020-vicinity",
+            "aranovskiy2020, (11): how far from the true rate its estimate rests, k1 and k2 of Table 2",
+            [
+                Panel(
+                    "rate error [rad/s]", biased_lines, "no noise; lines: closed form; above: chatter", e, "log", "log"
+                ),
+                Panel("RMS rate error\n[rad/s]", noisy_lines, "with noise, no bias", sigma, "log", "log"),
+            ],
+            share_x=False,
+        ),
     )
 
 
@@ -237,27 +230,22 @@ LAG_SEED = 76_000
 TAUS_S = (0.01, 0.015, 0.02, 0.03, 0.05, 0.08)
 
 
-class Trade(NamedTuple):
-    """Lag and noise gain of (9) with one time constant."""
+def trade(tau: float, seed: int = LAG_SEED) -> tuple[float, float]:
+    """Replay (9) with one time constant on a steadily accelerated tilt, and on noise.
 
-    lag_s: float
-    """Delay of the estimate of a steadily rising rate [s]."""
-    noise_gain_1_s: float
-    """RMS of the estimate by that of a white noise measured [1/s]."""
-
-
-def trade(tau: float, seed: int = LAG_SEED) -> Trade:
-    """Replay (9) on a steadily accelerated tilt, and on noise."""
+    Returns:
+        Delay of the estimate of a steadily rising rate [s], RMS of the estimate by that of a white noise measured
+        [1/s].
+    """
     time, settling_ticks = np.arange(2000) * DT, 400
     acceleration = 0.3
     noise = np.random.default_rng(seed).normal(0.0, 1.0, (len(time), 8))
     y1 = np.column_stack([acceleration * time**2 / 2.0, noise])
     x2 = replay_at_rest(make_observer("linear", DT, printed_model(), tau=tau), y1).x2
-    late = time[-1] - x2[-1, 0] / acceleration
-    return Trade(late, np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2)))
+    return time[-1] - x2[-1, 0] / acceleration, np.sqrt(np.mean(x2[settling_ticks:, 1:] ** 2))
 
 
-def predict_trade(tau: float) -> Trade:
+def predict_trade(tau: float) -> tuple[float, float]:
     """Predict the trade by G = s/(tau s + 1)^2, whose phase falls with the slope 2 tau.
 
     A sample of noise is a triangle in time, two samples wide: the weights are the impulse response's means over it. For
@@ -269,7 +257,7 @@ def predict_trade(tau: float) -> Trade:
     triangle = 1.0 - np.abs(np.arange(-fine, fine + 1)) / fine
     weights = np.convolve(response, triangle)[fine::fine] * DT / fine
     weights[0] -= response[0] / 2.0 * DT / fine  # trapezoidal rule at the response's jump
-    return Trade(2.0 * tau, np.sqrt(np.sum(weights**2)))
+    return 2.0 * tau, np.sqrt(np.sum(weights**2))
 
 
 def lag(seed: int = LAG_SEED) -> Claim:
@@ -288,20 +276,18 @@ def lag(seed: int = LAG_SEED) -> Claim:
     ]
     x = "tau [s]"
     return Claim(
-        place="(9), lag and noise",
-        statement="A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
+        "(9), lag and noise",
+        "A filter with the differentiator reduces noise, but lag distorts the estimate: tau trades them.",
         holds=largest_size(lags / lags_foreseen - 1.0) < 0.01
         and largest_size(gains / gains_foreseen - 1.0) < 0.05
         and sorted(gains, reverse=True) == list(gains),
         figures={"tau_s": TAUS_S, "lag_s": lags, "noise_gain_1_s": gains},
-        pictures=[
-            Picture(
-                "aranovskiy2020-eq-9",
-                "aranovskiy2020, (9): the lag of the linear differentiator against its noise",
-                [
-                    Panel("lag [ms]", lag_lines, "", x, "log", "log"),
-                    Panel("noise gain [1/s]", noise_lines, "", x, "log", "log"),
-                ],
-            )
-        ],
+        picture=Picture(
+            "aranovskiy2020-eq-9",
+            "aranovskiy2020, (9): the lag of the linear differentiator against its noise",
+            [
+                Panel("lag [ms]", lag_lines, "", x, "log", "log"),
+                Panel("noise gain [1/s]", noise_lines, "", x, "log", "log"),
+            ],
+        ),
     )

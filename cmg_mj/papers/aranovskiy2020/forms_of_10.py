@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, signed_powers
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Estimate, Measurement, Observer
+from cmg_mj.observers.homogeneous import Homogeneous
 from cmg_mj.observers.ltv import LinearTimeVarying, State, exact_step, map_of_one
-from cmg_mj.papers.aranovskiy2020.paper import H_0, TABLE_2, A_prime, C, printed_model, riccati_slope
+from cmg_mj.observers.model_copy import CopyState
+from cmg_mj.papers.aranovskiy2020.paper import H_0, A_prime, C, printed_model, riccati_slope
+from cmg_mj.papers.claim import Array
 from cmg_mj.papers.pair import DT, run_of_10
 from cmg_mj.papers.recorded import rms
 
-Method = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+Method = Callable[[Array, Array, float], Array]
 """(H, A', step) -> H one step later."""
 
 # --- methods for the Riccati equation ---------------------------------------------------------------------------
 
 
-def euler(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+def euler(H: Array, A: Array, h: float) -> Array:
     """Take one explicit Euler step."""
     return H + H.dtype.type(h) * riccati_slope(H, A)
 
 
-def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None) -> np.ndarray:
+def rk4(H: Array, A: Array, h: float, first: Array | None = None) -> Array:
     """Take one classical Runge-Kutta step."""
     t = H.dtype.type(h)
     k1 = riccati_slope(H, A, first)
@@ -38,12 +40,12 @@ def rk4(H: np.ndarray, A: np.ndarray, h: float, first: np.ndarray | None = None)
     return H + t / 6 * (k1 + 2 * k2 + 2 * k3 + riccati_slope(H + t * k3, A, first))
 
 
-def rk4_as_printed(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+def rk4_as_printed(H: Array, A: Array, h: float) -> Array:
     """Take the step with the printed first term, H A^T with A of (6)."""
     return rk4(H, A, h, printed_model().A)
 
 
-def exact_method(H: np.ndarray, A: np.ndarray, h: float) -> np.ndarray:
+def exact_method(H: Array, A: Array, h: float) -> Array:
     """Take one sample of this package's observer at rest, where A is that of `A_prime()`."""
     observer, at_rest = make_exact(h), Measurement(0.0, 0.0)
     (h11, h12, _), (_, h22, _), (*_, h33) = H.tolist()
@@ -67,7 +69,7 @@ def make_exact(dt: float = DT) -> LinearTimeVarying:
     return LinearTimeVarying(dt=dt, model=printed_model())
 
 
-def matrix_of(state: State) -> np.ndarray:
+def matrix_of(state: State) -> Array:
     """Return H of this package's observer, (3, 3)."""
     return np.array([[state.h11, state.h12, 0.0], [state.h12, state.h22, 0.0], [0.0, 0.0, state.h33]], dtype=float)
 
@@ -84,11 +86,11 @@ class Plain:
     method: Method
     dt: float = DT
 
-    def init(self, y: Measurement) -> tuple[np.ndarray, np.ndarray]:
+    def init(self, y: Measurement) -> tuple[Array, Array]:
         """Start at rest, with H = H_0."""
         return np.array([y.y1, 0.0, y.y2]), H_0
 
-    def step(self, state: tuple[np.ndarray, np.ndarray], y: Measurement, u: float) -> tuple[Any, Any]:
+    def step(self, state: tuple[Array, Array], y: Measurement, u: float) -> tuple[Any, Any]:
         """Advance by one sample period: H by the method, the estimate by Euler."""
         x, H = state
         drift, gain, damping = printed_model().terms(*y)
@@ -121,42 +123,20 @@ def compare(form: Observer, other_form: Observer, seed: int) -> Comparison:
 # --- by explicit Euler, on floats and arrays ---------------------------------------------------------------------
 
 
-class Ten(NamedTuple):
-    """The estimate, and the entries of H that do not stay zero."""
-
-    x1: Scalar
-    x2: Scalar
-    x3: Scalar
-    h11: Scalar
-    h12: Scalar
-    h22: Scalar
-    h33: Scalar
-
-
 @dataclass(frozen=True)
-class TenByEuler:
+class TenByEuler(LinearTimeVarying):
     """(10), one Euler step a sample at the newest measurement, as `Plain` in matrices.
 
     Attributes:
-        dt: Sample period [s].
-        model: The reduced model.
         exact_gain: Whether H takes the exact step instead, and the estimate alone Euler's.
     """
 
-    dt: float
-    model: ReducedModel
     exact_gain: bool = False
 
-    def init(self, y: Measurement) -> Ten:
-        """Start at rest, with H = H_0."""
-        zero = 0.0 * y.y1
-        h11, h22, h33 = TABLE_2["ltv"]["H0"]
-        return Ten(y.y1, zero, y.y2, h11 + zero, zero, h22 + zero, h33 + zero)
-
-    def step(self, state: Ten, y: Measurement, u: Scalar) -> tuple[Ten, Estimate]:
+    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Estimate]:
         """Advance by one sample period."""
-        x1, x2, x3, h11, h12, h22, h33 = state
-        dt, (q1, q2, q3) = self.dt, TABLE_2["ltv"]["Q"]
+        x1, x2, x3, h11, h12, h22, h33, before, terms = state
+        dt, (q1, q2, q3) = self.dt, self.Q
         drift, gain, damping = self.model.terms(*y)
         a = -u * damping
         off1, off3 = x1 - y.y1, x3 - y.y2
@@ -170,41 +150,25 @@ class TenByEuler:
             # Two halves: the series of the exact step wants a short one.
             for _ in range(2):
                 h11, h12, h22 = exact_step(h11, h12, h22, q1, q2, a, dt / 2.0)
-            return Ten(*estimate, h11, h12, h22, (h33 + up) / (down * h33 + 1.0)), estimate
-        return Ten(
+            return State(*estimate, h11, h12, h22, (h33 + up) / (down * h33 + 1.0), before, terms), estimate
+        return State(
             *estimate,
             h11 + dt * (2.0 * h12 - h11 * h11 + q1),
             h12 + dt * (h22 + a * h12 - h11 * h12),
             h22 + dt * (2.0 * a * h22 - h12 * h12 + q2),
             h33 + dt * (q3 - h33 * h33),
+            before,
+            terms,
         ), estimate
 
 
-@dataclass(frozen=True)
-class ElevenByEuler:
-    """(11), one Euler step a sample at the newest measurement.
+class ElevenByEuler(Homogeneous):
+    """(11), one Euler step a sample at the newest measurement."""
 
-    Attributes:
-        dt: Sample period [s].
-        model: The reduced model.
-    """
-
-    dt: float
-    model: ReducedModel
-
-    def init(self, y: Measurement) -> Estimate:
-        """Start at rest at the measured tilt."""
-        return Estimate(y.y1, 0.0 * y.y1, y.y2)
-
-    def step(self, state: Estimate, y: Measurement, u: Scalar) -> tuple[Estimate, Estimate]:
+    def step(self, state: CopyState, y: Measurement, u: Scalar, bias: Scalar = 0.0) -> tuple[CopyState, Estimate]:
         """Advance by one sample period."""
-        x1, x2, _ = state
-        k1, k2, alpha = TABLE_2["homogeneous"].values()
+        x1, x2, before, terms = state
         drift, gain, damping = self.model.terms(*y)
-        by_alpha, by_other = signed_powers(x1 - y.y1, alpha)
-        estimate = Estimate(
-            x1 + self.dt * (x2 - k1 * by_alpha),
-            x2 + self.dt * (drift + u * (gain - damping * x2) - k2 * by_other),
-            y.y2,
-        )
-        return estimate, estimate
+        c1, c2 = self.correction(x1 - y.y1, None)
+        x1, x2 = x1 + self.dt * (x2 - c1), x2 + self.dt * (drift + u * (gain - damping * x2) - c2)
+        return CopyState(x1, x2, before, terms), Estimate(x1, x2, y.y2)

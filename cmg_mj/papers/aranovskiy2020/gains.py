@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from cmg_mj.observers import make_observer
 from cmg_mj.papers.aranovskiy2020.paper import K_E, K_E_ROUNDING, printed_model
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.pair import DT, PUSH_RECOVERY, replay_at_rest, run_loops
 from cmg_mj.papers.recorded import trace, trajectory_of
 from cmg_mj.results.intervals import Interval, mean_interval
@@ -22,21 +22,7 @@ from cmg_mj.view.plots.figure import Panel, Picture
 # --- inverse optimality -----------------------------------------------------------------------------------------
 
 
-class Inverse(NamedTuple):
-    """The answer of the return difference for a gain."""
-
-    least: float
-    """min over w of |1 + K (jw - A)^-1 B|."""
-    diagonal: np.ndarray
-    """The one diagonal of Q that would give K: with a negative entry no diagonal Q >= 0 does."""
-    Q: np.ndarray | None
-    """A Q >= 0 of rank 1 that makes K the LQR gain, (n, n); None if there is none (Kalman 1964: the minimum is below
-    1)."""
-    recovered: float | None
-    """Relative error of the Riccati equation's gain for that Q."""
-
-
-def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
+def inverse_optimality(A: Array, B: Array, K: Array) -> tuple[float, Array, Array | None, float | None]:
     """Decide whether K is the LQR gain of x' = A x + B u for some cost x' Q x + u^2.
 
     With d the open-loop and p the closed-loop polynomial and n_i/d the transfer function to x_i, a cost Q = diag(q)
@@ -48,7 +34,10 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
         K: Gain, (n,).
 
     Returns:
-        The answer.
+        The answer of the return difference: the least |1 + K (jw - A)^-1 B| over w; the one diagonal of Q that would
+        give K, which no diagonal Q >= 0 does if it has a negative entry; a Q >= 0 of rank 1 that makes K the LQR gain,
+        (n, n), None if there is none (Kalman 1964: the least is below 1); relative error of the Riccati equation's gain
+        for that Q.
     """
     d, p = np.poly(A), np.poly(A - B @ K[None, :])
     numerators = np.array(
@@ -62,16 +51,16 @@ def inverse_optimality(A: np.ndarray, B: np.ndarray, K: np.ndarray) -> Inverse:
     basis = np.column_stack([_squared(row) for row in numerators])[1:]
     diagonal = np.linalg.lstsq(basis, gap, rcond=None)[0]
     if np.polyval(gap, grid).min() < 0.0 or gap[-1] < 0.0:
-        return Inverse(least, diagonal, None, None)
+        return least, diagonal, None, None
     # Spectral factor: the half of the roots of gap(-s^2) to the left.
     left_roots = [-np.sqrt(-w) if np.sqrt(-w).real > 0.0 else np.sqrt(-w) for w in roots.astype(complex)]
     factor = math.sqrt(abs(gap[0])) * np.real(np.poly(left_roots))
     c = np.linalg.solve(numerators[:, 1:].T, factor)
     Q = np.outer(c, c)
-    return Inverse(least, diagonal, Q, np.abs(lqr_gain(A, B, Q) / K - 1.0).max())
+    return least, diagonal, Q, np.abs(lqr_gain(A, B, Q) / K - 1.0).max()
 
 
-def _squared(polynomial: np.ndarray) -> np.ndarray:
+def _squared(polynomial: Array) -> Array:
     """Return |p(jw)|^2 as a polynomial in w^2, highest power first."""
     n = len(polynomial) - 1
     signs = (-1.0) ** (n - np.arange(n + 1))
@@ -79,7 +68,7 @@ def _squared(polynomial: np.ndarray) -> np.ndarray:
     return even * signs  # s^2 = -w^2
 
 
-def lqr_gain(A: np.ndarray, B: np.ndarray, Q: np.ndarray) -> np.ndarray:
+def lqr_gain(A: Array, B: Array, Q: Array) -> Array:
     """Return the LQR gain for Q and R = 1, (n,)."""
     return (B.T @ solve_continuous_are(A, B, Q, np.eye(1)))[0]
 
@@ -90,9 +79,7 @@ SEARCHES = 3
 """Number of starts of a search, each from where it ended: a simplex may collapse."""
 
 
-def nearest_diagonal(
-    A: np.ndarray, B: np.ndarray, K: np.ndarray, rounding: Sequence[float], start: np.ndarray
-) -> tuple[np.ndarray, float]:
+def nearest_diagonal(A: Array, B: Array, K: Array, rounding: Sequence[float], start: Array) -> tuple[Array, float]:
     """Search the diagonal Q whose LQR gain with R = 1 comes nearest to K.
 
     Args:
@@ -106,10 +93,10 @@ def nearest_diagonal(
         The diagonal, (n,), and the largest difference of its gain from K by the rounding: 1 is rounding's.
     """
 
-    def weights(logarithms: np.ndarray) -> np.ndarray:
+    def weights(logarithms: Array) -> Array:
         return np.maximum(np.exp(logarithms), MIN_WEIGHT)
 
-    def off(logarithms: np.ndarray) -> float:
+    def off(logarithms: Array) -> float:
         try:
             return (np.abs(lqr_gain(A, B, np.diag(weights(logarithms))) - K) / rounding).max()
         except LinAlgError:  # Q with entries too far apart for the solver
@@ -124,18 +111,18 @@ def nearest_diagonal(
 def lqr_gains() -> Claim:
     """Judge whether Table 2's K_e is an LQR gain."""
     A, B, K = printed_model().A_e, printed_model().B_e, np.array(K_E)
-    inverse = inverse_optimality(A, B, K)
-    diagonal, off = nearest_diagonal(A, B, K, K_E_ROUNDING, inverse.diagonal)
+    least, candidate, Q, recovered = inverse_optimality(A, B, K)
+    diagonal, off = nearest_diagonal(A, B, K, K_E_ROUNDING, candidate)
     return Claim(
-        place="Table 2, K_e",
-        statement="K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
-        holds=inverse.recovered is not None and inverse.recovered < 1e-6,
+        "Table 2, K_e",
+        "K_e = [35, 4, -1, 0.3] are LQR gains; the weights are not given.",
+        holds=recovered is not None and recovered < 1e-6,
         conditions="" if off < 1.0 else "The cost is not a weighted sum of squares of the single states.",
         figures={
-            "least_return_difference": inverse.least,
-            "recovered_gain_relative_error": inverse.recovered,
-            "Q": inverse.Q,
-            "diagonal_candidate": inverse.diagonal,
+            "least_return_difference": least,
+            "recovered_gain_relative_error": recovered,
+            "Q": Q,
+            "diagonal_candidate": candidate,
             "diagonal_within_rounding": diagonal,
             "gain_within_rounding": lqr_gain(A, B, np.diag(diagonal)),
             "difference_by_rounding": off,
@@ -150,11 +137,11 @@ DURATION_S = 26.0
 AVERAGED_S = 6.0
 """The last so many seconds are averaged [s]; the slowest poles, -0.2 +- 0.29j 1/s, have then faded to 2 %."""
 BIAS_DEG = 0.5
-ASSUMED: Mapping[str, str] = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
+ASSUMED = {"e": f"{BIAS_DEG:g} deg", "noise": PUSH_RECOVERY["noise"]}
 
 TRUE_RATE = "the true rate, (8)"
 ESTIMATED = ['controller.angle_source="estimated"']
-CASES: Mapping[str, tuple[str, Sequence[str]]] = {
+CASES = {
     TRUE_RATE: ("homogeneous", ['controller.feedback="truth"']),
     "(10), estimated angles": ("ltv", ESTIMATED),
     "(11), estimated angles": ("homogeneous", ESTIMATED),
@@ -186,15 +173,15 @@ def find_rests(cases: Iterable[str], worlds: int, seed: int, *extra: str) -> dic
     common = ["push=[]", "plant.initial_tilt_deg=0.0", f"plant.equilibrium_bias_deg={BIAS_DEG}"]
     loops = {case: (CASES[case][0], [*common, *CASES[case][1], *extra]) for case in cases}
     results = run_loops(loops, worlds, seed, DURATION_S)
-    return {case: _average(CASES[case][0], trajectory_of(result)) for case, result in results.items()}
-
-
-def _average(observer: str, run: Trajectory) -> Rest:
-    late = run["time_s"] >= DURATION_S - AVERAGED_S
-    names = ("x1_rad", "x3_rad", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s")
-    factors = (math.degrees(1.0), math.degrees(1.0), 1.0, 1.0)
-    x1, x3, x_e, x2 = (mean_interval(f * run[name][late].mean(axis=0)) for name, f in zip(names, factors, strict=True))
-    return Rest(x1, x3, x_e, x2, run.world(0))
+    degree, rests = math.degrees(1.0), {}
+    for case, result in results.items():
+        run = trajectory_of(result)
+        late = run["time_s"] >= DURATION_S - AVERAGED_S
+        rate = f"estimate/{CASES[case][0]}/x2_rad_s"
+        factors = {"x1_rad": degree, "x3_rad": degree, "x_e_rad_times_s": 1.0, rate: 1.0}
+        x1, x3, x_e, x2 = (mean_interval(factor * run[name][late].mean(axis=0)) for name, factor in factors.items())
+        rests[case] = Rest(x1, x3, x_e, x2, run.world(0))
+    return rests
 
 
 def steady(observer: str, e_deg: float, sigma: float) -> tuple[float, float]:
@@ -229,8 +216,8 @@ def laws_claim(rest: Rest, static: Rest) -> Claim:
     k1, _, k3, k4 = K_E
     x_e, x3 = k1 / k4 * math.radians(BIAS_DEG), k1 / k3 * BIAS_DEG
     return Claim(
-        place="(7), (8) on the rig",
-        statement="Without the integrator the gimbal rests away from zero; with it x converges to zero.",
+        "(7), (8) on the rig",
+        "Without the integrator the gimbal rests away from zero; with it x converges to zero.",
         assumes=ASSUMED,
         holds=rest.is_at_zero(x_e) and abs(static.x3.mean / x3 - 1.0) < 0.05,
         conditions="With the signs that follow from y1 = x1 - e: k1/k3 e and +k_e1/k_e4 e.",
@@ -249,9 +236,13 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
     """Judge the rests by case, with an observer in the law, which the bias biases."""
     example = rests[TRUE_RATE].example
     sigma = float(np.std(example["y1_rad"] - example["x1_rad"]))
-    figures, at_zero = {}, []
-    for case in list(CASES)[1:]:
-        rest, expected = rests[case], expected_integrator(CASES[case][0], sigma)
+    figures, at_zero, integrators, tilts = {}, [], [], []
+    for i, (case, rest) in enumerate(rests.items()):
+        integrators.append(trace(rest.example, "x_e_rad_times_s", case, color=i))
+        tilts.append(trace(rest.example, "x1_rad", color=i, width=0.5))
+        if case == TRUE_RATE:
+            continue
+        expected = expected_integrator(CASES[case][0], sigma)
         at_zero.append(rest.is_at_zero(expected))
         figures |= {
             f"tilt_rest {case}_deg": rest.x1,
@@ -260,24 +251,17 @@ def observers_claim(rests: Mapping[str, Rest]) -> Claim:
             f"rate_estimated {case}_rad_s": rest.x2_estimated,
         }
     return Claim(
-        place="After (10), the equilibrium",
-        statement="The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
+        "After (10), the equilibrium",
+        "The integral action makes x = 0 the equilibrium even with an observer whose estimate e biases.",
         assumes=ASSUMED,
         holds=all(at_zero),
         figures=figures,
-        pictures=[_picture(rests)],
-    )
-
-
-def _picture(rests: Mapping[str, Rest]) -> Picture:
-    integrators, tilts = [], []
-    for i, (case, rest) in enumerate(rests.items()):
-        integrators.append(trace(rest.example, "x_e_rad_times_s", case, color=i))
-        tilts.append(trace(rest.example, "x1_rad", color=i, width=0.5))
-    return Picture(
-        "aranovskiy2020-equilibrium",
-        f"aranovskiy2020, Section III and after (10): the way to rest from the upright, e = {BIAS_DEG:g} deg, world 0",
-        [Panel("integrator x_e [rad s]", integrators), Panel("tilt x1 [deg]", tilts)],
+        picture=Picture(
+            "aranovskiy2020-equilibrium",
+            "aranovskiy2020, Section III and after (10): the way to rest from the upright, "
+            f"e = {BIAS_DEG:g} deg, world 0",
+            [Panel("integrator x_e [rad s]", integrators), Panel("tilt x1 [deg]", tilts)],
+        ),
     )
 
 

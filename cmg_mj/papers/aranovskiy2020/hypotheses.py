@@ -6,18 +6,16 @@ Pairs whose halves differ turn body A. The controller and the observers do not k
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.linear_check import mass_matrix
 from cmg_mj.papers.pair import DURATION_S, PUSH_RECOVERY, push_recovery, run_on_rigs
 from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
-from cmg_mj.plant.elements import Module
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.intervals import Interval, known_interval, ratio_interval
 from cmg_mj.results.result import Result
@@ -29,51 +27,36 @@ SEED, WORLDS = 75_000, 4
 # --- pairs whose halves differ ----------------------------------------------------------------------------------
 
 
-def slower_flywheel(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
-    """Slow the second flywheel down by a share (Hypothesis 2 and 3: unequal speeds)."""
-    model.key_ctrl[key, module.motor] *= 1.0 - share
-    model.key_qvel[key, module.flywheel] *= 1.0 - share
+def spoil(rig: Plant, kind: str, size: float) -> None:
+    """Break a rig: its second cube differs by one kind of `MISMATCHES`, of a size."""
+    model, key, module = rig.model, rig.key, rig.axis.modules[1]
+    if kind == "flywheel speed":  # slower by a share (Hypotheses 2 and 3)
+        model.key_ctrl[key, module.motor] *= 1.0 - size
+        model.key_qvel[key, module.flywheel] *= 1.0 - size
+    elif kind == "gimbal offset":  # off its place at the start, by an angle [deg] (Hypothesis 2)
+        offset = module.direction * math.radians(size)
+        model.key_qpos[key, module.gimbal] += offset
+        model.key_act[key, model.actuator_actadr[module.servo]] += offset
+    elif kind == "servo gain":  # the gimbal turns farther than commanded, by a share (Hypothesis 1)
+        gear = 1.0 / (1.0 + size)
+        # Its setpoint counts in angle times gear, from where the gimbal starts.
+        model.actuator_gear[module.servo, 0] = gear
+        model.key_act[key, model.actuator_actadr[module.servo]] = gear * model.key_qpos[key, module.gimbal]
+    else:  # dry friction, of which the first gimbal has none (Hypothesis 1)
+        model.dof_frictionloss[module.gimbal] = size
 
 
-def gimbal_offset(model: mujoco.MjModel, key: int, module: Module, offset_deg: float) -> None:
-    """Start the second gimbal off its place (Hypothesis 2)."""
-    offset = module.direction * math.radians(offset_deg)
-    model.key_qpos[key, module.gimbal] += offset
-    model.key_act[key, model.actuator_actadr[module.servo]] += offset
-
-
-def servo_gain(model: mujoco.MjModel, key: int, module: Module, share: float) -> None:
-    """Let the second servo turn its gimbal farther than commanded, by a share (Hypothesis 1)."""
-    gear = 1.0 / (1.0 + share)
-    # Its setpoint counts in angle times gear, from where the gimbal starts.
-    model.actuator_gear[module.servo, 0] = gear
-    model.key_act[key, model.actuator_actadr[module.servo]] = gear * model.key_qpos[key, module.gimbal]
-
-
-def gimbal_friction(model: mujoco.MjModel, key: int, module: Module, torque_n_m: float) -> None:
-    """Give the second gimbal dry friction, the first none (Hypothesis 1)."""
-    model.dof_frictionloss[module.gimbal] = torque_n_m
-
-
-@dataclass(frozen=True)
-class Mismatch:
-    """One way in which the second cube differs.
-
-    Attributes:
-        kind: Its name.
-        change: Function that breaks a rig so, (model, key, second module, size): its second cube differs by a size.
-        sizes: Sizes of the mismatch that are tried.
-        unit: Unit of the sizes.
-        display_factor: Number by which a size is multiplied to be shown in that unit.
-        is_predictable: Whether `predict_yaw_rate` has it.
-    """
+class Mismatch(NamedTuple):
+    """One way in which the second cube differs: see `spoil`."""
 
     kind: str
-    change: Callable[[mujoco.MjModel, int, Module, float], None]
     sizes: Sequence[float]
+    """Sizes that are tried."""
     unit: str
-    display_factor: float
+    display_factor: float = 1.0
+    """Number by which a size is multiplied to be shown in that unit."""
     is_predictable: bool = True
+    """Whether `predict_yaw_rate` has it."""
 
     def words(self, size: float) -> str:
         """Write one size of it."""
@@ -81,10 +64,10 @@ class Mismatch:
 
 
 MISMATCHES = (
-    Mismatch("flywheel speed", slower_flywheel, (0.01, 0.02, 0.05, 0.1), "%", 100.0),
-    Mismatch("gimbal offset", gimbal_offset, (1.0, 2.0, 5.0, 10.0), "deg", 1.0),
-    Mismatch("servo gain", servo_gain, (0.02, 0.05, 0.1, 0.2), "%", 100.0),
-    Mismatch("gimbal friction", gimbal_friction, (0.1, 0.3, 1.0), "N m", 1.0, is_predictable=False),
+    Mismatch("flywheel speed", (0.01, 0.02, 0.05, 0.1), "%", 100.0),
+    Mismatch("gimbal offset", (1.0, 2.0, 5.0, 10.0), "deg"),
+    Mismatch("servo gain", (0.02, 0.05, 0.1, 0.2), "%", 100.0),
+    Mismatch("gimbal friction", (0.1, 0.3, 1.0), "N m", is_predictable=False),
 )
 
 
@@ -108,7 +91,7 @@ def run_all(
     cases = [(mismatch, size) for mismatch in mismatches for size in mismatch.sizes]
     rigs = [load_plant(experiment.scenario.plant) for _ in range(1 + len(cases))]
     for rig, (mismatch, size) in zip(rigs[1:], cases, strict=True):
-        mismatch.change(rig.model, rig.key, rig.axis.modules[1], size)
+        spoil(rig, mismatch.kind, size)
     symmetric, *broken = run_on_rigs(experiment, rigs, worlds)
     kinds = [(mismatch.kind, size) for mismatch, size in cases]
     return MismatchRuns(rigs[0], symmetric, dict(zip(kinds, broken, strict=True)))
@@ -117,44 +100,37 @@ def run_all(
 # --- the turn of body A: conservation of momentum about the vertical --------------------------------------------
 
 
-class Inertia(NamedTuple):
-    """The parts of the momentum about the vertical at the upright."""
+def inertias(plant: Plant) -> Array:
+    """Read the parts of the momentum about the vertical off the mass matrix at the keyframe.
 
-    yaw: float
-    """Inertia of all that turns with body A [kg m^2]."""
-    gimbal: float
-    """I_c + I_d of a gimbal about its own axis [kg m^2]."""
-    spin: float
-    """J_d [kg m^2]."""
-
-
-def inertia_of(plant: Plant) -> Inertia:
-    """Read off the mass matrix at the keyframe."""
+    Returns:
+        Inertia of all that turns with body A, I_c + I_d of a gimbal about its own axis, and J_d, (3,) [kg m^2].
+    """
     data = mujoco.MjData(plant.model)
     mujoco.mj_resetDataKeyframe(plant.model, data, plant.key)
     M, module = np.diag(mass_matrix(plant.model, data)), plant.axis.modules[0]
-    return Inertia(*(M[i] for i in (plant.yaw or 0, module.gimbal, module.flywheel)))
+    return M[[plant.yaw or 0, module.gimbal, module.flywheel]]
 
 
-def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> np.ndarray:
+def balanced_yaw_rate(plant: Plant, trajectory: Trajectory) -> Array:
     """Body A's rate by conservation: no torque acts about the vertical, so I q_a' + what is carried stays [rad/s].
 
     Gimbals and flywheels carry momentum. The gimbals' axis is b_x, whose vertical part is -sin q_b; the flywheels' is
     b_y cos q_c + b_z sin q_c, whose vertical part is cos q_b sin q_c.
     """
-    parts, names = inertia_of(plant), plant.joint_names
+    (yaw, gimbal, spin), names = inertias(plant), plant.joint_names
     tilt = trajectory[f"angle/{names[plant.tilt]}_rad"]
     momentum = np.zeros_like(tilt)
     for module in plant.axis.modules:
         angle = trajectory[f"angle/{names[module.gimbal]}_rad"]
         turning = trajectory[f"rate/{names[module.gimbal]}_rad_s"]
         spinning = trajectory[f"rate/{names[module.flywheel]}_rad_s"]
-        momentum = momentum - parts.gimbal * turning * np.sin(tilt)
-        momentum = momentum + parts.spin * spinning * np.cos(tilt) * np.sin(angle)
-    return (momentum[0] - momentum) / parts.yaw
+        momentum = momentum - gimbal * turning * np.sin(tilt)
+        momentum = momentum + spin * spinning * np.cos(tilt) * np.sin(angle)
+    return (momentum[0] - momentum) / yaw
 
 
-def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> np.ndarray:
+def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajectory) -> Array:
     """Body A's rate foretold from a run of the symmetric rig, for a small mismatch [rad/s].
 
     The law holds the mean of both gimbal angles x3, whatever each does, so x3 and the tilt are those of the symmetric
@@ -169,10 +145,10 @@ def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajector
     Returns:
         The rate, (n_ticks, ...).
     """
-    parts = inertia_of(plant)
+    yaw, gimbal, spin = inertias(plant)
     tilt = trajectory[f"angle/{plant.joint_names[plant.tilt]}_rad"]
     x3, turning = trajectory["x3_rad"], np.gradient(trajectory["x3_rad"], trajectory["time_s"], axis=0)
-    h = parts.spin * abs(plant.axis.modules[0].speed) * np.cos(tilt)
+    h = spin * abs(plant.axis.modules[0].speed) * np.cos(tilt)
     if kind == "flywheel speed":
         momentum = size * h * np.cos(x3)
     elif kind == "gimbal offset":
@@ -180,8 +156,8 @@ def predict_yaw_rate(kind: str, size: float, plant: Plant, trajectory: Trajector
         momentum = h * (np.cos(x3 - half) - np.cos(x3 + half))
     else:  # servo gain
         first = 2.0 * x3 / (2.0 + size)
-        momentum = h * (np.cos(first) - np.cos((1.0 + size) * first)) + parts.gimbal * size * turning * np.sin(tilt)
-    return (momentum[0] - momentum) / parts.yaw
+        momentum = h * (np.cos(first) - np.cos((1.0 + size) * first)) + gimbal * size * turning * np.sin(tilt)
+    return (momentum[0] - momentum) / yaw
 
 
 # --- the claims -------------------------------------------------------------------------------------------------
@@ -216,7 +192,7 @@ def measure_yaw(runs: MismatchRuns, mismatch: Mismatch, size: float) -> dict[str
     }
 
 
-def _largest_deg(angle: np.ndarray) -> float:
+def _largest_deg(angle: Array) -> float:
     """Return the largest size of an angle, mean over the worlds, from (n_ticks, n_worlds) [rad]."""
     return np.degrees(np.abs(angle).max(axis=0)).mean()
 
@@ -225,8 +201,8 @@ def symmetric_claim(runs: MismatchRuns) -> Claim:
     """Judge Hypotheses 1 and 2 kept."""
     turn = np.degrees(largest_size(trajectory_of(runs.symmetric)["angle/yaw_rad"]))
     return Claim(
-        place="Hypotheses 1 and 2",
-        statement="With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
+        "Hypotheses 1 and 2",
+        "With symmetric gimbals, flywheels and commands no torque acts on body A: it stands still.",
         holds=turn < 1e-6,
         figures={"largest_turn_deg": turn},
     )
@@ -236,20 +212,6 @@ def broken_claim(runs: MismatchRuns) -> Claim:
     """Judge Hypotheses 1 and 2 broken."""
     yaws = {m.words(size): measure_yaw(runs, m, size) for m in MISMATCHES for size in m.sizes}
     none_fell = all(result.stood.all() for result in (runs.symmetric, *runs.broken.values()))
-    return Claim(
-        place="After Hypothesis 3",
-        statement="If Hypotheses 1 and 2 are violated the reduced model is off by an unknown term; the experiments "
-        "show the assumptions to be reasonable for the velocity estimation.",
-        holds=none_fell and max(abs(yaw["velocity_rms_error_by_symmetric"].mean - 1.0) for yaw in yaws.values()) < 0.1,
-        assumes={**PUSH_RECOVERY, "mismatch": ", ".join(f"up to {m.words(m.sizes[-1])}" for m in MISMATCHES)},
-        conditions="For the tilt and its estimate, up to the mismatches tried. Body A itself does not stay: on a "
-        "bearing without friction it turns while the gimbals are out, and stays where it was left.",
-        figures=yaws,
-        pictures=[_picture(runs, yaws)],
-    )
-
-
-def _picture(runs: MismatchRuns, yaws: Mapping[str, Mapping[str, Any]]) -> Picture:
     symmetric = trajectory_of(runs.symmetric)
     t, shaded = symmetric["time_s"], push_intervals(symmetric.world(0))
     rates, turns, sweep = [], [], []
@@ -266,15 +228,25 @@ def _picture(runs: MismatchRuns, yaws: Mapping[str, Mapping[str, Any]]) -> Pictu
             rates.append(Line(t, predicted_rate, "" if i else "foreseen", "k--", width=0.8))
             turns.append(Line(t, np.degrees(np.cumsum(predicted_rate) * (t[1] - t[0])), style="k--", width=0.8))
             sweep.append(Line(x, [yaw["turn_foreseen_deg"] for yaw in measured], style="kx"))
-    return Picture(
-        "aranovskiy2020-hypotheses",
-        "aranovskiy2020, Hypotheses 1 and 2 broken: what thrust bearing A does (dashed and x: foreseen)",
-        [
-            Panel("yaw rate of A [rad/s]", rates, "world 0", shaded=shaded),
-            Panel("yaw of A [deg]", turns, shaded=shaded),
-            Panel("largest turn [deg]", sweep, "", "mismatch by the largest tried", "log", "log"),
-        ],
-        share_x=False,
+    return Claim(
+        "After Hypothesis 3",
+        "If Hypotheses 1 and 2 are violated the reduced model is off by an unknown term; the experiments "
+        "show the assumptions to be reasonable for the velocity estimation.",
+        holds=none_fell and max(abs(yaw["velocity_rms_error_by_symmetric"].mean - 1.0) for yaw in yaws.values()) < 0.1,
+        assumes={**PUSH_RECOVERY, "mismatch": ", ".join(f"up to {m.words(m.sizes[-1])}" for m in MISMATCHES)},
+        conditions="For the tilt and its estimate, up to the mismatches tried. Body A itself does not stay: on a "
+        "bearing without friction it turns while the gimbals are out, and stays where it was left.",
+        figures=yaws,
+        picture=Picture(
+            "aranovskiy2020-hypotheses",
+            "aranovskiy2020, Hypotheses 1 and 2 broken: what thrust bearing A does (dashed and x: foreseen)",
+            [
+                Panel("yaw rate of A [rad/s]", rates, "world 0", shaded=shaded),
+                Panel("yaw of A [deg]", turns, shaded=shaded),
+                Panel("largest turn [deg]", sweep, "", "mismatch by the largest tried", "log", "log"),
+            ],
+            share_x=False,
+        ),
     )
 
 
@@ -283,7 +255,7 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
     plant, run = runs.plant, trajectory_of(runs.symmetric)
     modules, model = plant.axis.modules, plant.reduced
 
-    def rate(joint: int) -> np.ndarray:
+    def rate(joint: int) -> Array:
         return run[f"rate/{plant.joint_names[joint]}_rad_s"]
 
     speeds = np.stack([np.abs(rate(module.flywheel)) for module in modules])
@@ -297,8 +269,8 @@ def hypothesis_3(runs: MismatchRuns) -> Claim:
     acceleration = np.gradient(run["x2_rad_s"], run["time_s"], axis=0)
     share = rms(omitted_term.ravel()) / rms(acceleration.ravel())
     return Claim(
-        place="Hypothesis 3",
-        statement="The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
+        "Hypothesis 3",
+        "The flywheels' speed is held constant and far above the rates of tilt and gimbals.",
         assumes={**PUSH_RECOVERY, "drive": "a speed loop of 0.11 s, at most 0.5 N m"},
         holds=speed_error / nominal < 0.01 and share < 0.01 and nominal > 10.0 * max(gimbal, tilt),
         figures={
@@ -404,9 +376,17 @@ def servo_claim(servos: Servos) -> Claim:
     errors = {d: measure_tracking(result) for d, result in results.items()}
     error = errors[RESOLUTION]
     changes = [abs(ratios[RESOLUTION].mean - 1.0) for ratios in (velocity, tilt)]
+    tilts, turns = [], []
+    shown = {"the bench's servo": servos.position} | {
+        f"deadband {d:g} rad/s": servos.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
+    }
+    for color, (label, result) in enumerate(shown.items()):
+        run = trajectory_of(result).world(0)
+        tilts.append(trace(run, "x1_rad", label, color=color, width=0.8))
+        turns.append(trace(run, "x3_rad", color=color, width=0.8))
     return Claim(
-        place="After (2), the servos",
-        statement="The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
+        "After (2), the servos",
+        "The gimbals' servos ensure velocity tracking, so that omega_c can be taken for an input.",
         assumes={**PUSH_RECOVERY, "servo": f"a lag of {1e3 * LAG_S:g} ms", "friction": "a deadband"},
         holds=falls[RESOLUTION] == 0.0 and max(changes) < WITHIN and error is not None and error.mean < WITHIN,
         conditions="With a servo that stiff, up to a deadband of 0.05 rad/s, with which the estimate's error and the "
@@ -422,21 +402,9 @@ def servo_claim(servos: Servos) -> Claim:
                 *(result.values("velocity_rms_error_rad_s") for result in (servos.position, smooth))
             ),
         },
-        pictures=[_servo_picture(servos)],
-    )
-
-
-def _servo_picture(servos: Servos) -> Picture:
-    tilts, turns = [], []
-    results = {"the bench's servo": servos.position} | {
-        f"deadband {d:g} rad/s": servos.velocity[d] for d in (0.0, DEADBANDS[3], DEADBANDS[-1])
-    }
-    for color, (label, result) in enumerate(results.items()):
-        run = trajectory_of(result).world(0)
-        tilts.append(trace(run, "x1_rad", label, color=color, width=0.8))
-        turns.append(trace(run, "x3_rad", color=color, width=0.8))
-    return Picture(
-        "aranovskiy2020-servo",
-        "aranovskiy2020, Section II: the gimbals' servos in velocity mode, with a deadband, world 0",
-        [Panel("tilt x1 [deg]", tilts), Panel("gimbal angle x3 [deg]", turns)],
+        picture=Picture(
+            "aranovskiy2020-servo",
+            "aranovskiy2020, Section II: the gimbals' servos in velocity mode, with a deadband, world 0",
+            [Panel("tilt x1 [deg]", tilts), Panel("gimbal angle x3 [deg]", turns)],
+        ),
     )

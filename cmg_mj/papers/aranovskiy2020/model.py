@@ -29,8 +29,8 @@ def table_1() -> Claim:
     paper = printed_model()
     error = model_difference(load_plant(equilibrium_bias_deg=0.0).reduced, paper)
     return Claim(
-        place="Table 1",
-        statement="Masses, lengths and inertias of the rig, from which J1 and J2 below (2) follow.",
+        "Table 1",
+        "Masses, lengths and inertias of the rig, from which J1 and J2 below (2) follow.",
         holds=error < 1e-9,
         conditions="m is printed as the total mass, but T and P use it as the mass of each half; read so, they fit "
         "together.",
@@ -101,9 +101,8 @@ def residuals(states: int = STATES, seed: int = SEED) -> dict[str, float]:
 def equations_2_to_4(r: Mapping[str, float]) -> Claim:
     """Judge (3) and (4) against MuJoCo's six bodies."""
     return Claim(
-        place="(2) to (4)",
-        statement="Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands "
-        "still.",
+        "(2) to (4)",
+        "Under Hypotheses 1 to 3 the six bodies move as one pendulum with one gimbal, and body A stands still.",
         holds=max(r["tilt"], r["yaw"]) < 1e-9 * r["size"] and r["tilt_turned_J2"] > 1e3 * r["tilt"],
         figures={f"{name}_rad_s2": size for name, size in r.items() if "torque" not in name},
     )
@@ -112,9 +111,8 @@ def equations_2_to_4(r: Mapping[str, float]) -> Claim:
 def gimbals_line(r: Mapping[str, float]) -> Claim:
     """Judge the second line of (2), which the velocity servos make superfluous later."""
     return Claim(
-        place="(2), tau_c",
-        statement="A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) "
-        "omega_b^2/2.",
+        "(2), tau_c",
+        "A gimbal's torque is (I_c + I_d) omega_c' + J_d omega_b omega_d sin q_c + J2 sin(2 q_c) omega_b^2/2.",
         holds=r["torque"] < 1e-9 * r["torque_size"] and r["torque_turned_J2"] > 1e3 * r["torque"],
         figures={f"{name}_n_m": size for name, size in r.items() if "torque" in name},
     )
@@ -133,8 +131,8 @@ def linearisation() -> Claim:
     error, margin = finite_difference_error(model), controllability_margin(model.A_e, model.B_e)
     no_spin = controllability_margin(still_model.A_e, still_model.B_e)
     return Claim(
-        place="(6), Section III",
-        statement="A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
+        "(6), Section III",
+        "A and B linearise (4); the pair (A_e, B_e) with the integrator is controllable.",
         holds=error < 1e-6 and margin > 1e-9 and no_spin < 1e-15,
         figures={"finite_difference_error": error, "rank_margin": margin, "rank_margin_flywheels_at_rest": no_spin},
     )
@@ -144,8 +142,8 @@ def law_equilibria() -> Claim:
     """Judge equilibria of (7) and (8) on the linearisation."""
     is_so, figures = law_rests(printed_model(), K_E, 7, 8)
     return Claim(
-        place="(7), (8)",
-        statement="Static feedback leaves the gimbal off by k1/k3 e; with the integrator x goes to zero and x_e "
+        "(7), (8)",
+        "Static feedback leaves the gimbal off by k1/k3 e; with the integrator x goes to zero and x_e "
         "settles at k_e1/k_e4 e (both printed with a minus).",
         holds=is_so,
         conditions="With y1 = x1 - e the bias enters (7) and (8) as +k1 e: both offsets have a plus where a minus is "

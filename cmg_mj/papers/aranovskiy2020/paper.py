@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.papers.claim import Array
 from cmg_mj.papers.cube import CUBE, reduced_model
 
 TABLE_1 = {**CUBE, "l": 0.19}
@@ -61,17 +62,17 @@ def gimbal_torque(x2: float, x3: float, gimbal_acceleration: float, omega_d: flo
     return inertial_torque + TABLE_1["J_d"] * x2 * omega_d * math.sin(q_c) + tilt_torque
 
 
-def damping(u: float | np.ndarray, y2: float | np.ndarray) -> float | np.ndarray:
+def damping(u: float | Array, y2: float | Array) -> float | Array:
     """Return a = -u J2 sin(2 y2)/(J1 + J2 sin(y2)^2), the one entry of A' in (10) that varies [1/s]."""
     return -u * printed_model().terms(0.0, y2)[2]
 
 
-def A_prime(a: float = 0.0) -> np.ndarray:
+def A_prime(a: float = 0.0) -> Array:
     """A'(y, u) of (10), by its entry a [1/s]; at rest, where a = 0, a double integrator. (3, 3)."""
     return np.array([[0.0, 1.0, 0.0], [0.0, a, 0.0], [0.0, 0.0, 0.0]])
 
 
-def riccati_slope(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
+def riccati_slope(H: Array, A: Array, first: Array | None = None) -> Array:
     """H' of (10): H A'^T + A' H - H C^T C H + Q, in the precision of H, (3, 3).
 
     Args:
@@ -82,13 +83,8 @@ def riccati_slope(H: np.ndarray, A: np.ndarray, first: np.ndarray | None = None)
     Returns:
         The slope.
     """
-    kind = H.dtype
-    return (
-        H @ (A if first is None else first).T.astype(kind)
-        + A.astype(kind) @ H
-        - H @ (C.T @ C).astype(kind) @ H
-        + Q.astype(kind)
-    )
+    A, first, lost, gained = (matrix.astype(H.dtype) for matrix in (A, A if first is None else first, C.T @ C, Q))
+    return H @ first.T + A @ H - H @ lost @ H + gained
 
 
 def settled_gains() -> tuple[float, float]:

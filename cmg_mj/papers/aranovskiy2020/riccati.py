@@ -27,11 +27,10 @@ from cmg_mj.papers.aranovskiy2020.forms_of_10 import (
     rk4_as_printed,
 )
 from cmg_mj.papers.aranovskiy2020.paper import H_0, OBSERVERS, A_prime, C, Q, damping, printed_model, settled_gains
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.linear_check import rank_margin
 from cmg_mj.papers.pair import DT, SEED_OF_10, run_of_10
 from cmg_mj.papers.recorded import largest_size
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.benchmark import time_of_update
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
@@ -47,7 +46,7 @@ class Transient(NamedTuple):
     """Least eigenvalue met; minus infinity if H was lost."""
     error: float
     """Largest error of H12, which weighs the measurement in the rate's estimate, by its steady value."""
-    path: np.ndarray
+    path: Array
     """H12 sample by sample, (n_samples,)."""
 
 
@@ -84,22 +83,11 @@ def lowest_rate(method: str, sweep: Mapping[float, Transient], passes: Callable[
     failing_rates = [rate for rate, result in sweep.items() if not passes(result)]
     if not failing_rates:
         return None
-    low, high = max(failing_rates), min((rate for rate in sweep if rate > max(failing_rates)), default=math.inf)
-    while math.isfinite(high) and high - low > 0.1:
+    low, high = max(failing_rates), min(rate for rate in sweep if rate > max(failing_rates))
+    while high - low > 0.1:
         middle = (low + high) / 2.0
         low, high = (low, middle) if passes(transient(method, middle)) else (middle, high)
     return high
-
-
-def matrices_along(run: Trajectory) -> np.ndarray:
-    """Return H of this package's observer along a run, from the second sample on, (n_ticks - 1, 3, 3)."""
-    observer = make_exact()
-    y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    state, matrices = observer.init(Measurement(y1[0], y2[0])), []
-    for k in range(1, len(y1)):
-        state, _ = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
-        matrices.append(matrix_of(state))
-    return np.array(matrices)
 
 
 def delicacy() -> Claim:
@@ -108,13 +96,26 @@ def delicacy() -> Claim:
     definite = {name: lowest_rate(name, sweep, lambda t: t.least > 0.0) for name, sweep in sweeps.items()}
     finite = {name: lowest_rate(name, sweep, lambda t: math.isfinite(t.error)) for name, sweep in sweeps.items()}
     at_200 = {name: transient(name, 1.0 / DT) for name in METHODS}
+    errors, least, paths = [], [], []
+    for i, (name, by_rate) in enumerate(sweeps.items()):
+        met = [t.error if math.isfinite(t.error) else math.nan for t in by_rate.values()]
+        positive = [t.least if t.least > 0.0 else math.nan for t in by_rate.values()]
+        path = np.concatenate([[0.0], at_200[name].path[:24]])
+        errors.append(Line(RATES_HZ, met, name, color=i))
+        least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))
+        paths.append(Line(np.arange(len(path)) * 5.0, path, name, color=i, style="--" if i == 2 else "o-"))
+    rate, span = "steps a second [Hz]", "largest in the first 0.2 s or 50 steps"
     float32 = {name: transient(name, 1.0 / DT, np.float32) for name in ("explicit Euler", "Runge-Kutta 4")}
-    comparison = compare(make_exact(), Plain(euler), SEED_OF_10)
-    matrices = matrices_along(run_of_10(SEED_OF_10))
+    run, observer = run_of_10(SEED_OF_10), make_exact()
+    comparison = compare(observer, Plain(euler), SEED_OF_10)
+    y1, y2, u = (run[name].tolist() for name in ("y1_rad", "y2_rad", "u_rad_s"))
+    state, matrices = observer.init(Measurement(y1[0], y2[0])), []
+    for k in range(1, len(y1)):
+        state, _ = observer.step(state, Measurement(y1[k], y2[k]), u[k - 1])
+        matrices.append(matrix_of(state))
     return Claim(
-        place="Remark 1, delicacy",
-        statement="The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify "
-        "it.",
+        "Remark 1, delicacy",
+        "The Riccati equation is sensitive to the numerical method; six decades between Q's entries amplify it.",
         assumes={"control rate": f"{1.0 / DT:g} Hz", "method": "explicit Euler, Runge-Kutta 4, the exact step"},
         holds=at_200["explicit Euler"].error > 0.1
         and at_200["Runge-Kutta 4"].error < 1e-2
@@ -134,29 +135,16 @@ def delicacy() -> Claim:
             "condition_along_run": np.linalg.cond(matrices).max(),
             "least_eigenvalue_along_run": np.linalg.eigvalsh(matrices).min(),
         },
-        pictures=[_picture(sweeps, at_200)],
-    )
-
-
-def _picture(sweeps: Mapping[str, Mapping[float, Transient]], at_200: Mapping[str, Transient]) -> Picture:
-    errors, least, paths = [], [], []
-    for i, (name, by_rate) in enumerate(sweeps.items()):
-        finite = [t.error if math.isfinite(t.error) else math.nan for t in by_rate.values()]
-        positive = [t.least if t.least > 0.0 else math.nan for t in by_rate.values()]
-        path = np.concatenate([[0.0], at_200[name].path[:24]])
-        errors.append(Line(RATES_HZ, finite, name, color=i))
-        least.append(Line(RATES_HZ, positive, name, color=i, style="o-" if i < 2 else "--"))
-        paths.append(Line(np.arange(len(path)) * 5.0, path, name, color=i, style="--" if i == 2 else "o-"))
-    rate, span = "steps a second [Hz]", "largest in the first 0.2 s or 50 steps"
-    return Picture(
-        "aranovskiy2020-remark-1",
-        "aranovskiy2020, Remark 1: the Riccati equation of (10) from H(0) = I, Q of Table 2",
-        [
-            Panel("error of H12\nby its steady value", errors, span, rate, "log", "log"),
-            Panel("least eigenvalue\nof H", least, "none where negative", rate, "log", y_range=(0.0, 1.1)),
-            Panel("H12 [1/s]", paths, "at 200 Hz", "time [ms]"),
-        ],
-        share_x=False,
+        picture=Picture(
+            "aranovskiy2020-remark-1",
+            "aranovskiy2020, Remark 1: the Riccati equation of (10) from H(0) = I, Q of Table 2",
+            [
+                Panel("error of H12\nby its steady value", errors, span, rate, "log", "log"),
+                Panel("least eigenvalue\nof H", least, "none where negative", rate, "log", y_range=(0.0, 1.1)),
+                Panel("H12 [1/s]", paths, "at 200 Hz", "time [ms]"),
+            ],
+            share_x=False,
+        ),
     )
 
 
@@ -168,7 +156,7 @@ HARMLESS = 0.05
 """Share of the rate's error: if the misprint changes the rate by less, either equation may have been run."""
 
 
-def settle(method: Method) -> np.ndarray:
+def settle(method: Method) -> Array:
     """Return H where a method settles at rest, (3, 3)."""
     H, h = H_0, 1e-3
     for _ in range(round(SETTLING_S / h)):
@@ -182,12 +170,12 @@ def misprint() -> Claim:
     return misprint_claim(settle(rk4), settle(rk4_as_printed), rates)
 
 
-def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Claim:
+def misprint_claim(H: Array, printed_H: Array, rate: Comparison) -> Claim:
     """Judge by H where either equation settles at rest, and by the rates that they estimate."""
     is_symmetric = abs(printed_H[0, 1] - printed_H[1, 0]) < 1e-6 * printed_H[1, 0]
     return Claim(
-        place="After (10), the Riccati equation",
-        statement="The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
+        "After (10), the Riccati equation",
+        "The symmetric gain matrix of (10) is the solution of H' = H A^T + A' H - H C^T C H + Q.",
         holds=is_symmetric or rate.difference < HARMLESS * rate.error,
         conditions=""
         if is_symmetric
@@ -208,13 +196,13 @@ def misprint_claim(H: np.ndarray, printed_H: np.ndarray, rate: Comparison) -> Cl
 # --- observability ----------------------------------------------------------------------------------------------
 
 
-def observability_margin(a: float, outputs: np.ndarray = C) -> float:
+def observability_margin(a: float, outputs: Array = C) -> float:
     """Return the rank margin of [C; C A'; C A'^2], for the outputs C."""
     A = A_prime(a)
     return rank_margin(np.vstack([outputs, outputs @ A, outputs @ A @ A]))
 
 
-def gramian_bounds(a: np.ndarray, dt: float, span_s: float) -> tuple[float, float]:
+def gramian_bounds(a: Array, dt: float, span_s: float) -> tuple[float, float]:
     """Return the least and largest eigenvalue of the observability Gramian over every span of a run.
 
     Phi(t, s) of A' has the first row [1, phi, 0] with phi' = exp(integral of a): Simpson's rule over the span, a held
@@ -257,8 +245,8 @@ def observability(seed: int = SEED_OF_10) -> Claim:
     extremes = [gramian_bounds(np.full(round(span_s / DT) + 1, a), DT, span_s) for a in (min(dampings), max(dampings))]
     bounds = min(pair[0] for pair in extremes), max(pair[1] for pair in extremes)
     return Claim(
-        place="After (10)",
-        statement="(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
+        "After (10)",
+        "(A', C) is observable for all u and y2, which makes the error of (10) converge exponentially.",
         assumes={"servo": f"at most {limit:g} rad/s"},
         holds=margin > 0.1 and margin_without_tilt < 1e-12 and bounds[0] > 0.0 and math.isfinite(bounds[1]),
         conditions="Pointwise observability alone is not uniform; a bounded u, as the servos have it, closes the gap.",
@@ -307,8 +295,8 @@ def cost(recorded: Path = RECORDED) -> Claim:
     single_times, batch_times = update_times(None, turns=3, updates=200), update_times(4096, turns=1, updates=4)
     dearest = max(board[name] for name in ("ltv", *PLAIN))
     return Claim(
-        place="Remark 1, cost",
-        statement="The observer (10) is computationally heavy in embedded systems: its gain takes differential "
+        "Remark 1, cost",
+        "The observer (10) is computationally heavy in embedded systems: its gain takes differential "
         "equations solved online.",
         holds=dearest > board["homogeneous"] > board["linear"],
         otherwise="On this processor it turns round: the powers in (11) cost more than a step of the equations of H, "

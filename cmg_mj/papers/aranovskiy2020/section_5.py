@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.papers.aranovskiy2020.paper import OBSERVERS, printed_model, settled_gains
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.pair import DURATION_S, PUSH_RECOVERY, push_recovery, run_loops
 from cmg_mj.papers.recorded import loop_picture, on_common_scales, open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.results.intervals import Interval, known_interval, mean_interval
@@ -29,7 +29,7 @@ WORLDS = 20
 ANGLES = ("measured", "estimated")
 """The angles that the law is fed with."""
 
-Numbers = Mapping[str, np.ndarray]
+Numbers = Mapping[str, Array]
 """Observer -> a measure, (n_worlds,); NaN for a world that did not stand. Less is better."""
 
 # --- Fig. 4 -----------------------------------------------------------------------------------------------------
@@ -46,28 +46,34 @@ def figure_4(worlds: int = WORLDS, seed: int = SEED_4) -> list[Claim]:
     settings = [f"seed={seed}", 'open_loop_observers=["ltv", "homogeneous"]']
     scenario = load_scenario("observer_tuning", settings, "linear")
     run = trajectory_of(prepare(scenario).run_many(worlds))
-    after_push = _errors_to_gyro(run.between(*window_of(scenario)))
+    after_push, example = _errors_to_gyro(run.between(*window_of(scenario))), run.world(0)
+    tilt = trace(example, "y1_rad", "measured", width=0.7)
+    rates = {name: example[f"estimate/{name}/x2_rad_s"] for name in OBSERVERS}
+    picture = Picture(
+        "aranovskiy2020-fig-4",
+        "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s",
+        open_loop_panels(example, rates, OBSERVERS, tilt, (-0.5, 0.45)),
+    )
     return [
-        comparable("from the push to a second after it", after_push, "_after_push", [_open_loop_picture(run.world(0))]),
+        comparable("from the push to a second after it", after_push, "_after_push", picture),
         comparable("over all 10 s", _errors_to_gyro(run)),
     ]
 
 
-def _errors_to_gyro(run: Trajectory) -> dict[str, np.ndarray]:
+def _errors_to_gyro(run: Trajectory) -> dict[str, Array]:
     """Return the RMS of the estimated rates less the gyro's, and of an estimate of zero, (n_worlds,) [rad/s]."""
     gyro = run["fog_rad_s"]
     return {name: rms(run[f"estimate/{name}/x2_rad_s"] - gyro) for name in OBSERVERS} | {"zero": rms(gyro)}
 
 
-def comparable(span: str, rms_errors: Numbers, suffix: str = "", pictures: Sequence[Picture] = ()) -> Claim:
+def comparable(span: str, rms_errors: Numbers, suffix: str = "", picture: Picture | None = None) -> Claim:
     """Judge one span of the run."""
     errors = {name: mean_interval(values) for name, values in rms_errors.items()}
     means = [errors[name].mean for name in OBSERVERS]
     spread = max(means) / min(means)
     return Claim(
-        place=f"Fig. 4, {span}",
-        statement="With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open "
-        "loop.",
+        f"Fig. 4, {span}",
+        "With the loop closed on the gyro and a push at 2 s, the three tuned observers are comparable open loop.",
         assumes={**PUSH_RECOVERY, "threshold": f"comparable is within a factor of {COMPARABLE:g}"},
         missing_data="The paper gives neither this recording, with its push, e and noise, nor a limit for comparable.",
         holds=spread < COMPARABLE,
@@ -77,17 +83,7 @@ def comparable(span: str, rms_errors: Numbers, suffix: str = "", pictures: Seque
             **{f"rms{suffix}_{name}_rad_s": interval for name, interval in errors.items()},
             f"largest_by_smallest{suffix}": spread,
         },
-        pictures=pictures,
-    )
-
-
-def _open_loop_picture(example: Trajectory) -> Picture:
-    tilt = trace(example, "y1_rad", "measured", width=0.7)
-    rates = {name: example[f"estimate/{name}/x2_rad_s"] for name in OBSERVERS}
-    return Picture(
-        "aranovskiy2020-fig-4",
-        "aranovskiy2020, Fig. 4: tuning, the law fed by the gyro, a push at 2 s",
-        open_loop_panels(example, rates, OBSERVERS, tilt, (-0.5, 0.45)),
+        picture=picture,
     )
 
 
@@ -106,7 +102,7 @@ def close_loops(
 
 def figure(name: str, results: Mapping[str, Result]) -> Claim:
     """Judge one of Figs 5 to 7."""
-    figures = {}
+    figures, equation, number = {}, OBSERVERS[name], FIGURES[name]
     for angles, result in results.items():
         figures |= {
             f"velocity_rms_error_{angles}_angles_rad_s": known_interval(result.values(JUDGED)),
@@ -115,25 +111,25 @@ def figure(name: str, results: Mapping[str, Result]) -> Claim:
             f"settled_fraction_{angles}_angles": np.isfinite(result.values("settle_time_s")).mean(),
         }
     return Claim(
-        place=FIGURES[name],
-        statement=f"With the estimate of {OBSERVERS[name]} in the law the rig stands, and recovers from a push.",
+        number,
+        f"With the estimate of {equation} in the law the rig stands, and recovers from a push.",
         assumes=PUSH_RECOVERY,
         holds=all(
             figures[f"fell_fraction_{angles}_angles"] == 0.0 and figures[f"settled_fraction_{angles}_angles"] == 1.0
             for angles in results
         ),
         figures=figures,
-        pictures=[_loop_picture(name, results)],
+        picture=loop_picture(
+            (
+                f"aranovskiy2020-fig-{number[-1]}",
+                f"aranovskiy2020, {number}: the loop closed on {equation}, the law on measured and on estimated angles",
+            ),
+            (name, equation),
+            {f"{angles} angles": result for angles, result in results.items()},
+            0.6,
+            gimbal=True,
+        ),
     )
-
-
-def _loop_picture(name: str, results: Mapping[str, Result]) -> Picture:
-    """Draw two columns: the law on measured angles, the law on estimated ones."""
-    equation = OBSERVERS[name]
-    title = f"{FIGURES[name]}: the loop closed on {equation}, the law on measured and on estimated angles"
-    picture = f"aranovskiy2020-fig-{FIGURES[name][-1]}", f"aranovskiy2020, {title}"
-    runs = {f"{angles} angles": result for angles, result in results.items()}
-    return loop_picture(picture, (name, equation), runs, 0.6, gimbal=True)
 
 
 # --- the order --------------------------------------------------------------------------------------------------
@@ -151,7 +147,7 @@ def is_positive(interval: Interval | None) -> bool:
     return interval is not None and interval.low > 0.0
 
 
-def order(key: str, numbers: Mapping[str, Numbers], pictures: Sequence[Picture] = ()) -> Claim:
+def order(key: str, numbers: Mapping[str, Numbers], picture: Picture | None = None) -> Claim:
     """Judge Section V's ranking by one measure: each step of it beyond chance, world by world, on all angles."""
     differences = {
         angles: [known_interval(by_name[worse] - by_name[better]) for worse, better in PAIRS]
@@ -162,8 +158,8 @@ def order(key: str, numbers: Mapping[str, Numbers], pictures: Sequence[Picture] 
         "over noise and bias is in docs/results.md."
     )
     return Claim(
-        place=f"Section V, the comparison: {KEYS[key].label}",
-        statement="The homogeneous differentiator performs best, the time-varying observer second, the linear one "
+        f"Section V, the comparison: {KEYS[key].label}",
+        "The homogeneous differentiator performs best, the time-varying observer second, the linear one "
         f"last; judged by the {KEYS[key].label}.",
         assumes=PUSH_RECOVERY,
         holds={f"{angles} angles": all(map(is_positive, steps)) for angles, steps in differences.items()},
@@ -174,23 +170,17 @@ def order(key: str, numbers: Mapping[str, Numbers], pictures: Sequence[Picture] 
             for angles, steps in differences.items()
             for (worse, better), step in zip(PAIRS, steps, strict=True)
         },
-        pictures=pictures,
+        picture=picture,
     )
 
 
 def orders(results: Mapping[str, Mapping[str, Result]]) -> list[Claim]:
     """Judge the ranking by each measure; the picture is the first one's."""
 
-    def measured(key: str) -> dict[str, dict[str, np.ndarray]]:
+    def measured(key: str) -> dict[str, dict[str, Array]]:
         return {angles: {name: r.values(key) for name, r in by_name.items()} for angles, by_name in results.items()}
 
-    measures = {key: measured(key) for key in MEASURES}
-    pictures = {JUDGED: [_measures_picture(measures)]}
-    return [order(key, numbers, pictures.get(key, [])) for key, numbers in measures.items()]
-
-
-def _measures_picture(measures: Mapping[str, Mapping[str, Numbers]]) -> Picture:
-    panels = []
+    measures, panels = {key: measured(key) for key in MEASURES}, []
     for key, by_angles in measures.items():
         is_first = key == JUDGED
         most = max(np.nanmax(values) for numbers in by_angles.values() for values in numbers.values())
@@ -202,12 +192,9 @@ def _measures_picture(measures: Mapping[str, Mapping[str, Numbers]]) -> Picture:
             label = KEYS[key].heading.replace(" RMS", "\nRMS")
             title = f"{angles} angles" if is_first else ""
             panels.append(Panel(label, marks, title, "world", y_range=(0.0, 1.05 * most)))
-    return Picture(
-        "aranovskiy2020-section-5",
-        "aranovskiy2020, Section V: measures of the closed loop, world by world",
-        panels,
-        columns=len(ANGLES),
-    )
+    title = "aranovskiy2020, Section V: measures of the closed loop, world by world"
+    picture = Picture("aranovskiy2020-section-5", title, panels, columns=len(ANGLES))
+    return [order(key, numbers, picture if key == JUDGED else None) for key, numbers in measures.items()]
 
 
 # --- the cause of the second place ------------------------------------------------------------------------------
@@ -215,7 +202,7 @@ def _measures_picture(measures: Mapping[str, Mapping[str, Numbers]]) -> Picture:
 _FORMS = "cmg_mj.papers.aranovskiy2020.forms_of_10"
 TEN, ELEVEN = "(10)", "(11)"
 TEN_BY_EULER, TEN_EXACT_GAIN, ELEVEN_BY_EULER = "(10), Euler", "(10), Euler, exact H", "(11), Euler"
-FORMS: Mapping[str, tuple[str, Sequence[str]]] = {
+FORMS = {
     TEN: ("ltv", []),
     ELEVEN: ("homogeneous", []),
     TEN_BY_EULER: (f"{_FORMS}:TenByEuler", []),
@@ -225,7 +212,7 @@ FORMS: Mapping[str, tuple[str, Sequence[str]]] = {
 """Form -> the observer in the loop and its settings."""
 
 
-def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, np.ndarray]:
+def errors_of(forms: Sequence[str], worlds: int, seed: int) -> dict[str, Array]:
     """Close the loop on some of `FORMS` as Figs 5 to 7 do: velocity RMS errors, (n_worlds,) [rad/s]."""
     results = run_loops({form: FORMS[form] for form in forms}, worlds, seed, keep_trajectory=False)
     return {form: result.values(JUDGED) for form, result in results.items()}
@@ -241,8 +228,8 @@ def cause(errors: Numbers) -> Claim:
     by_euler = known_interval(errors[TEN_BY_EULER] - errors[ELEVEN_BY_EULER])
     method = known_interval((errors[TEN_BY_EULER] - errors[TEN]) - (errors[ELEVEN_BY_EULER] - errors[ELEVEN]))
     return Claim(
-        place="Section V, the cause of the second place",
-        statement="(10) comes after (11) partly because of the numerical computations that (10) takes.",
+        "Section V, the cause of the second place",
+        "(10) comes after (11) partly because of the numerical computations that (10) takes.",
         assumes={**PUSH_RECOVERY, "method": "explicit Euler at 200 Hz"},
         holds=is_positive(method) and is_positive(exact),
         conditions="By explicit Euler at 200 Hz, of which the paper says nothing. Nearly all of the method's share "
@@ -279,27 +266,21 @@ JUDGED_DEG = 0.5
 # --- the time-invariant observer with which the rig could not be stabilised: which gain, which model -------------
 
 
-class Gain(NamedTuple):
-    """Gain on e = x1 - y1: x1' has -l1 e, x2' has -l2 e, so the error's poles without gravity are s^2 + l1 s + l2."""
-
-    l1: float
-    l2: float
-
-
-def damped_gain(speed: float) -> Gain:
+def damped_gain(speed: float) -> tuple[float, float]:
     """Return the gain whose poles lie 45 degrees off the real axis, as those of the frozen Riccati gain do [rad/s]."""
-    return Gain(math.sqrt(2.0) * speed, speed**2)
+    return math.sqrt(2.0) * speed, speed**2
 
 
 PREDECESSOR, FROZEN = "predecessor's", "frozen"
-GAINS: dict[str, Gain] = {
+GAINS = {
     "slow": damped_gain(10.0),
-    PREDECESSOR: Gain(20.0, 150.0),
+    PREDECESSOR: (20.0, 150.0),
     "medium": damped_gain(20.0),
     "fast": damped_gain(30.0),
-    FROZEN: Gain(*settled_gains()),
+    FROZEN: settled_gains(),
 }
-"""Gains, the slow first. The predecessor's is of its Table II; the Riccati equation settles at the frozen one."""
+"""Gains l1, l2 on e = x1 - y1, the slow first: x1' has -l1 e, x2' has -l2 e, so the error's poles without gravity are
+s^2 + l1 s + l2. The predecessor's is of its Table II; the Riccati equation settles at the frozen one."""
 PRINTED = (PREDECESSOR, FROZEN)
 """The gains that the authors could have run: the verdict goes by them."""
 
@@ -386,44 +367,8 @@ def remark() -> Claim:
 
 def remark_claim(cells: Mapping[Cell, Fates], whole: Fates) -> Claim:
     """Judge it by the fates of every cell, and of (10)."""
-    falls = any(cells[gain, model][JUDGED_DEG].fell == 1.0 for gain in PRINTED for model in MODELS)
-    return Claim(
-        place="Section V, the time-invariant observer",
-        statement="A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
-        assumes={
-            "push": PUSH_RECOVERY["push"],
-            "e": f"{min(whole):g} to {max(whole):g} deg",
-            "noise": PUSH_RECOVERY["noise"],
-            "gains": ", ".join(GAINS),
-        },
-        missing_data="The paper gives neither the gain nor the model of its time-invariant observer.",
-        holds=falls and whole[JUDGED_DEG].fell == 0.0,
-        conditions="At e = 0.5 deg, with the predecessor's gain and gravity at the estimate. A constant gain is not "
-        "the cause: frozen at the value at which the Riccati equation settles, it stands with either model at every "
-        "bias tried. The cause is a small gain, and then the model: the predecessor's falls from 0.5 deg with gravity "
-        "at the estimate, from 1 deg with gravity at y1.",
-        otherwise="At e = 0.5 deg neither the predecessor's gain nor the frozen one of (10) falls in every world, with "
-        "either model, where (10) stands.",
-        figures={
-            "bias_deg": list(whole),
-            **{
-                f"{gain}, {model}": {
-                    "l1_1_s": GAINS[gain].l1,
-                    "l2_1_s2": GAINS[gain].l2,
-                    "rate_bias_rad_s_per_rad": rate_bias((gain, model)),
-                    "fell_fraction": [fate.fell for fate in fates.values()],
-                    "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
-                }
-                for (gain, model), fates in cells.items()
-            },
-            "fell_fraction (10)": [fate.fell for fate in whole.values()],
-            "velocity_rms_error (10)_rad_s": [fate.error for fate in whole.values()],
-        },
-        pictures=[_falls_picture(cells, whole)],
-    )
+    is_so = any(cells[gain, model][JUDGED_DEG].fell == 1.0 for gain in PRINTED for model in MODELS)
 
-
-def _falls_picture(cells: Mapping[Cell, Fates], whole: Fates) -> Picture:
     def error_line(fates: Fates, label: str = "", style: str = "o-", color: int | None = None) -> Line:
         known = {e: fate.error for e, fate in fates.items() if fate.error is not None}
         return Line(list(known), list(known.values()), label, style, color)
@@ -439,9 +384,42 @@ def _falls_picture(cells: Mapping[Cell, Fates], whole: Fates) -> Picture:
         shares.append(Panel("share of falls [%]", falls, y_range=(-5.0, 105.0)))
         label = "velocity\nRMS error [rad/s]"
         errors.append(Panel(label, velocities, "of those that stood", "equilibrium bias e [deg]", y_range=(0.0, 0.2)))
-    return Picture(
-        "aranovskiy2020-time-invariant",
-        "aranovskiy2020, Section V: time-invariant observers, gravity at the estimate (left) and at y1",
-        [*shares, *errors],
-        columns=2,
+    return Claim(
+        "Section V, the time-invariant observer",
+        "A linear time-invariant observer, which is a particular case of (10), could not stabilise the rig.",
+        assumes={
+            "push": PUSH_RECOVERY["push"],
+            "e": f"{min(whole):g} to {max(whole):g} deg",
+            "noise": PUSH_RECOVERY["noise"],
+            "gains": ", ".join(GAINS),
+        },
+        missing_data="The paper gives neither the gain nor the model of its time-invariant observer.",
+        holds=is_so and whole[JUDGED_DEG].fell == 0.0,
+        conditions="At e = 0.5 deg, with the predecessor's gain and gravity at the estimate. A constant gain is not "
+        "the cause: frozen at the value at which the Riccati equation settles, it stands with either model at every "
+        "bias tried. The cause is a small gain, and then the model: the predecessor's falls from 0.5 deg with gravity "
+        "at the estimate, from 1 deg with gravity at y1.",
+        otherwise="At e = 0.5 deg neither the predecessor's gain nor the frozen one of (10) falls in every world, with "
+        "either model, where (10) stands.",
+        figures={
+            "bias_deg": list(whole),
+            **{
+                f"{gain}, {model}": {
+                    "l1_1_s": GAINS[gain][0],
+                    "l2_1_s2": GAINS[gain][1],
+                    "rate_bias_rad_s_per_rad": rate_bias((gain, model)),
+                    "fell_fraction": [fate.fell for fate in fates.values()],
+                    "velocity_rms_error_rad_s": [fate.error for fate in fates.values()],
+                }
+                for (gain, model), fates in cells.items()
+            },
+            "fell_fraction (10)": [fate.fell for fate in whole.values()],
+            "velocity_rms_error (10)_rad_s": [fate.error for fate in whole.values()],
+        },
+        picture=Picture(
+            "aranovskiy2020-time-invariant",
+            "aranovskiy2020, Section V: time-invariant observers, gravity at the estimate (left) and at y1",
+            [*shares, *errors],
+            columns=2,
+        ),
     )

@@ -17,8 +17,6 @@ from cmg_mj.scenario.schema import Scenario
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 SEED, WORLDS, LOOP_WORLDS = 74_000, 12, 10
-LOOP_SHARE = 0.1
-"""Share of the section's time that the closed loops take."""
 DEFAULT_NOISE = 400.0
 STRONG = "1 N m, e = 0.5 deg"
 """The push of Figs 5 to 7."""
@@ -160,9 +158,8 @@ def procedure_claim(studies: Studies, loops: Loops) -> Claim:
             "in_the_loop_table_2_by_tuned_error": dict(ratios),
         }
     return Claim(
-        place="Section V, tuning",
-        statement="Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes "
-        "it.",
+        "Section V, tuning",
+        "Fitting an observer to the gyro's rate, recorded with the loop closed on the gyro and a push, tunes it.",
         assumes={"push": "; ".join(studies), "noise": f"{min(noises):g} to {max(noises):g} ug/rtHz"},
         holds=any(experiment.beats_zero for experiment in candidates),
         conditions="In some of the experiments tried, those worth tuning in of Table 2, the three together: there all "
@@ -176,9 +173,19 @@ def procedure_claim(studies: Studies, loops: Loops) -> Claim:
 def joint_claim(studies: Studies) -> Claim:
     """Judge whether one experiment has all three lines of Table 2."""
     nearest, candidates = nearest_joint(studies), experiments(studies)
+    panels = []
+    for push, by_name in studies.items():
+        lines = []
+        for color, (name, levels) in enumerate(by_name.items(), 1):
+            noise = [level.noise_ug_rthz for level in levels]
+            means, spread = ([getattr(level.ratio, part) for level in levels] for part in ("mean", "half"))
+            lines.append(Line(noise, means, "" if panels else OBSERVERS[name], "o-", color, spread=spread))
+        x = "accelerometer noise density [ug/rtHz]"
+        label = "error of Table 2's\nby that of the tuned"
+        panels.append(Panel(label, lines, push, x, "log", y_range=(0.9, 3.0)))
     return Claim(
-        place="Table 2, the three together",
-        statement="The three observers were tuned on the same collected data: Fig. 4's one experiment.",
+        "Table 2, the three together",
+        "The three observers were tuned on the same collected data: Fig. 4's one experiment.",
         assumes=nearest.assumed,
         missing_data=UNRECORDED,
         holds=nearest.beats_zero and all(map(is_best, nearest.levels.values())),
@@ -188,7 +195,11 @@ def joint_claim(studies: Studies) -> Claim:
             "worst_table_2_by_tuned_error": {experiment.words: experiment.largest_ratio for experiment in candidates},
             "worth_tuning_in": [experiment.words for experiment in candidates if experiment.beats_zero],
         },
-        pictures=[_picture(studies)],
+        picture=Picture(
+            "aranovskiy2020-table-2",
+            "aranovskiy2020, Table 2: the observers tuned again, on held-out seeds; 1 where Table 2's are the best",
+            panels,
+        ),
     )
 
 
@@ -196,8 +207,8 @@ def line_claim(observer: str, studies: Studies, experiment: JointExperiment) -> 
     """Judge Table 2's line of one observer in the experiment that all three lines come nearest to."""
     level = experiment.levels[observer]
     return Claim(
-        place=f"Table 2, {OBSERVERS[observer]}",
-        statement=f"{LINES[observer]}, tuned to fit the gyro best.",
+        f"Table 2, {OBSERVERS[observer]}",
+        f"{LINES[observer]}, tuned to fit the gyro best.",
         assumes=experiment.assumed,
         missing_data=UNRECORDED,
         holds=is_best(level) and beats_zero(level),
@@ -211,27 +222,9 @@ def line_claim(observer: str, studies: Studies, experiment: JointExperiment) -> 
     )
 
 
-def _picture(studies: Studies) -> Picture:
-    panels = []
-    for push, by_name in studies.items():
-        lines = []
-        for color, (name, levels) in enumerate(by_name.items(), 1):
-            noise = [level.noise_ug_rthz for level in levels]
-            means, spread = ([getattr(level.ratio, part) for level in levels] for part in ("mean", "half"))
-            lines.append(Line(noise, means, "" if panels else OBSERVERS[name], "o-", color, spread=spread))
-        x = "accelerometer noise density [ug/rtHz]"
-        label = "error of Table 2's\nby that of the tuned"
-        panels.append(Panel(label, lines, push, x, "log", y_range=(0.9, 3.0)))
-    return Picture(
-        "aranovskiy2020-table-2",
-        "aranovskiy2020, Table 2: the observers tuned again, on held-out seeds; 1 where Table 2's are the best",
-        panels,
-    )
-
-
 def claims(on_share: OnShare) -> list[Claim]:
     """Judge section V's procedure, whether Table 2 is one experiment's, and a line of it an observer."""
-    studies = tune_all(scenario_of, PUSHES, TUNED, WORLDS, lambda share: on_share((1.0 - LOOP_SHARE) * share))
+    studies = tune_all(scenario_of, PUSHES, TUNED, WORLDS, on_share)
     experiment = nearest_joint(studies)
     return [
         procedure_claim(studies, close_loops(studies, experiment)),

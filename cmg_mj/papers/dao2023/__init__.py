@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cmg_mj.papers.claim import Section, section
+from cmg_mj.papers.claim import section
 from cmg_mj.papers.dao2023 import figures, on_the_rig, theory
 
-SECTIONS: list[Section] = [
+SECTIONS = [
     section("pendulum robot", 14.0, figures.figures_claims),
     section("equations (7) to (9)", 5.0, theory.separated_errors, theory.upsilon),
     section("as printed", 2.0, theory.sampling_claim, theory.misprint_claim),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ SIGMAS = (*paper.SIGMAS, 10_000.0)
 SETTLED = 0.1
 """Settled: the errors of theta1, theta2 and d, as a vector of their numbers in the units of Fig. 3, stay below this."""
 
-ASSUMED: Mapping[str, str] = {"initial values": "ten motions", "duration": "200 s"}
+ASSUMED = {"initial values": "ten motions", "duration": "200 s"}
 UNSTATED = (
     "The paper gives neither time span nor initial values: ten motions with angles within half a turn and rates within "
     "2 rad/s, observers started from zero, 200 s, with the corrected L = -[1; 1]."
@@ -195,14 +195,13 @@ def conventional(study: Study) -> Claim:
     ]
     title = "dao2023, Fig. 2: state error at Sigma = 10, one of ten motions (the first seconds leave the axes)"
     return Claim(
-        place="Fig. 2(a)",
-        statement="With the conventional observer, which knows of no disturbance, the error of the state goes on "
-        "oscillating.",
+        "Fig. 2(a)",
+        "With the conventional observer, which knows of no disturbance, the error of the state goes on oscillating.",
         assumes=ASSUMED,
         holds=rms.min() > 0.2,
         conditions=UNSTATED,
         figures={"conventional_state_rms_160_200_s": rms},
-        pictures=[Picture("dao2023-fig-2", title, panels)],
+        picture=Picture("dao2023-fig-2", title, panels),
     )
 
 
@@ -210,8 +209,8 @@ def proposed(study: Study) -> Claim:
     """Judge (b)."""
     rms, plain = study.proposed.tail_rms()[0], study.conventional.tail_rms()[0]
     return Claim(
-        place="Fig. 2(b)",
-        statement="With the proposed observer the error of the state tends to zero.",
+        "Fig. 2(b)",
+        "With the proposed observer the error of the state tends to zero.",
         assumes=ASSUMED,
         holds=rms.max() < 0.1 and (rms < plain).all(),
         conditions=UNSTATED,
@@ -228,8 +227,8 @@ def speed_claim(study: Study) -> Claim:
         "and the disturbance."
     )
     return Claim(
-        place="Fig. 2(b), how fast",
-        statement="With the proposed observer the error of the state tends to zero soon.",
+        "Fig. 2(b), how fast",
+        "With the proposed observer the error of the state tends to zero soon.",
         assumes={**ASSUMED, "threshold": f"soon is at most {QUICK:g} times as slow as knowing all"},
         missing_data="The paper gives no time within which it counts as quick.",
         holds=np.median(learning_times) <= QUICK * np.median(ideal_times),
@@ -269,40 +268,39 @@ def settling_order(study: Study) -> Claim:
     ten, thousand, tenth = times
     in_order = (thousand < ten) & (ten <= tenth) & np.isfinite(thousand)
     faster_early, n = np.sum(early[1] < early[0]), len(ten)
-    meaning = (
-        f"{UNSTATED} Settled means that the errors of (theta1, theta2, d), as a vector of their "
-        f"numbers in 1/s^2, 1/(kg m^2) and rad/s^2, stay below {SETTLED}. The "
-        f"order is one of the end: into a band of 1.0, Sigma = 1000 is the faster one in {faster_early} of {n} "
-        "motions only."
-    )
     t, errors = study.proposed.t[::20], study.proposed.exogenous[::20, :, 0]
     labels = ("$\\theta_1$ [1/s$^2$]", "$\\theta_2$ [1/(kg m$^2$)]", "$d$ [rad/s$^2$]")
     panels = [
         _panel(f"({letter}) Sigma = {SIGMAS[i]:g}", t, errors[:, i], labels, 4.0) for i, letter in enumerate("abc")
     ]
-    title = "dao2023, Fig. 3: errors of theta1, theta2 and d, one of ten motions (first seconds beyond the axes)"
     return Claim(
-        place="Fig. 3(a), (b), (c)",
-        statement="Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
+        "Fig. 3(a), (b), (c)",
+        "Against Sigma = 10, parameters and disturbance are found sooner with 1000 and later with 0.1.",
         assumes={**ASSUMED, "threshold": f"settled is below {SETTLED:g}"},
         holds=in_order.sum() >= 0.9 * n,
-        conditions=meaning,
+        conditions=f"{UNSTATED} Settled means that the errors of (theta1, theta2, d), as a vector of their "
+        f"numbers in 1/s^2, 1/(kg m^2) and rad/s^2, stay below {SETTLED}. The "
+        f"order is one of the end: into a band of 1.0, Sigma = 1000 is the faster one in {faster_early} of {n} "
+        "motions only.",
         figures={f"settles_below_0_1_sigma_{sigma:g}_s": row for sigma, row in zip(paper.SIGMAS, times, strict=True)}
         | {"motions_ordered": in_order.sum(), "motions_faster_into_band_1_at_1000": faster_early, "motions": n},
-        pictures=[Picture("dao2023-fig-3", title, panels)],
+        picture=Picture(
+            "dao2023-fig-3",
+            "dao2023, Fig. 3: errors of theta1, theta2 and d, one of ten motions (first seconds beyond the axes)",
+            panels,
+        ),
     )
 
 
 def parameters(study: Study) -> Claim:
     """Judge (b), where it ends."""
     errors = np.abs(study.proposed.exogenous[-1, 1, :, :2])
-    sampling_remark = f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1."
     return Claim(
-        place="Fig. 3(b), parameters",
-        statement="At Sigma = 1000 theta1 and theta2 are found.",
+        "Fig. 3(b), parameters",
+        "At Sigma = 1000 theta1 and theta2 are found.",
         assumes={**ASSUMED, "control rate": "400 Hz"},
         holds=errors.max() < 1e-3,
-        conditions=sampling_remark,
+        conditions=f"{UNSTATED} At 400 Hz; at 200 Hz the straight line between samples leaves up to 3e-3 in theta1.",
         figures={
             "theta1_error_1_s2": errors[:, 0],
             "theta2_error_1_kg_m2": errors[:, 1],
@@ -321,10 +319,9 @@ def larger_gains(study: Study) -> Claim:
         Line(study.proposed.t[::80], np.median(size[::80, i], axis=-1), f"Sigma = {SIGMAS[i]:g}")
         for i in np.argsort(SIGMAS)
     ]
-    title = "dao2023, section 3.2: error of (theta1, theta2, d), each over its true size, median of ten motions"
     return Claim(
-        place="Section 3.2, conclusion",
-        statement="L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
+        "Section 3.2, conclusion",
+        "L_m grows in proportion to Sigma, and the more of it, the sooner every estimate settles.",
         is_general=True,
         assumes={**ASSUMED, "threshold": f"settled is below {SETTLED:g}"},
         holds={
@@ -336,7 +333,9 @@ def larger_gains(study: Study) -> Claim:
         if in_order
         else f"{UNSTATED} The settling times are not in order at the three weights tested either.",
         figures={f"median_settle_sigma_{sigma:g}_s": value for sigma, value in zip(SIGMAS, medians, strict=True)},
-        pictures=[
-            Picture("dao2023-gain", title, [Panel("norm of the relative errors [-]", lines, y_scale="log")]),
-        ],
+        picture=Picture(
+            "dao2023-gain",
+            "dao2023, section 3.2: error of (theta1, theta2, d), each over its true size, median of ten motions",
+            [Panel("norm of the relative errors [-]", lines, y_scale="log")],
+        ),
     )

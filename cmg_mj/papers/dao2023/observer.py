@@ -135,7 +135,7 @@ class FriedlandTacker:
         x, xm = np.zeros(n) if x is None else x, np.zeros(nm) if xm is None else xm
         return State(x, xm, np.zeros((n, nm)), self.Gamma, y)
 
-    def step(self, state: State, system: System, u: Array, y: Array, D20: Array | None = None) -> State:
+    def step(self, state: State, system: System, u: Array, y: Array) -> State:
         """Advance by one sample period.
 
         Args:
@@ -143,7 +143,6 @@ class FriedlandTacker:
             system: The plant's matrices in the middle between the samples.
             u: The input there, (..., m).
             y: The measurement at sample k, (..., p).
-            D20: D20 at sample k itself, if it varies with time.
 
         Returns:
             The state at sample k.
@@ -161,7 +160,7 @@ class FriedlandTacker:
         xm = times(F, xm)
         P = F @ P @ F.T
 
-        D20_Cm = (system.D20 if D20 is None else D20) @ self.Cm
+        D20_Cm = system.D20 @ self.Cm
         G = system.C2 @ T + D20_Cm
         gain = P @ np.swapaxes(G, -1, -2) @ self.Sigma  # -Lm
         nu = solve(np.eye(L.shape[-1]) + h * (G @ gain), times(system.C2, x) + times(D20_Cm, xm) - y)

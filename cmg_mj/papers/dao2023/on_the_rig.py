@@ -71,19 +71,15 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
     trajectory = trajectory_of(result).between(0.0, 5.0)
     estimates = np.degrees(trajectory["estimate/adaptive/bias_rad"])
     lines = [Line(trajectory["time_s"], estimates[:, i], f"e = {biases[i]:.2f} deg", width=0.8) for i in range(6)]
-    title = "dao2023, on the six-body rig: the bias that the adaptive observer finds, six worlds"
-    remark = (
-        f"Six bodies, datasheet sensors (400 ug/rtHz), 200 Hz, no push, {worlds} worlds with |e| "
-        "from 0.3 to 1.5 degrees; gains from docs/studies/tune_adaptive.py. The servo's lag, which the observer does "
-        "not know, does not prevent it."
-    )
     return Claim(
-        place="On the rig: equilibrium bias",
-        statement=f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over "
+        "On the rig: equilibrium bias",
+        f"`adaptive` finds the equilibrium bias together with the state, to {WITHIN_DEG} degrees RMS over "
         "seconds 5 to 10.",
         assumes={"push": "none", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=np.mean(errors <= WITHIN_DEG) >= 0.95 and np.all(offset_errors <= WITHIN_DEG),
-        conditions=remark,
+        conditions=f"Six bodies, datasheet sensors (400 ug/rtHz), 200 Hz, no push, {worlds} worlds with |e| "
+        "from 0.3 to 1.5 degrees; gains from docs/studies/tune_adaptive.py. The servo's lag, which the observer does "
+        "not know, does not prevent it.",
         figures={
             "bias_deg": biases,
             "bias_rms_error_deg": errors,
@@ -91,7 +87,11 @@ def bias(seed: int = 50_000, worlds: int = 20) -> Claim:
             "found_less_e_deg": excess,
             "expected_less_e_deg": expected_excess,
         },
-        pictures=[Picture("dao2023-rig-bias", title, [Panel("estimate of e [deg]", lines)])],
+        picture=Picture(
+            "dao2023-rig-bias",
+            "dao2023, on the six-body rig: the bias that the adaptive observer finds, six worlds",
+            [Panel("estimate of e [deg]", lines)],
+        ),
         is_ours=True,
     )
 
@@ -105,25 +105,25 @@ def velocity(seed: int = 51_000, worlds: int = 5, biases: Sequence[float] = (0.0
     intervals = {name: [mean_interval(row) for row in rows] for name, rows in by_observer.items()}
     means = {name: [interval.mean for interval in row] for name, row in intervals.items()}
     halves = {name: [interval.half for interval in row] for name, row in intervals.items()}
-    remark = (
-        f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
-        "is nothing to learn, and learning costs noise: there, homogeneous has "
-        f"{means['homogeneous'][0]:.3f} and adaptive {means['adaptive'][0]:.3f} rad/s."
-    )
-    title = f"dao2023, on the six-body rig: velocity RMS error in the loop ({worlds} worlds, 95 % intervals)"
     lines = [Line(biases, means[name], name, "o-", name, spread=halves[name]) for name in OBSERVERS]
     panel = Panel("velocity RMS error [rad/s]", lines, x_label="equilibrium bias e [deg]")
     return Claim(
-        place="On the rig: velocity",
-        statement="From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) "
+        "On the rig: velocity",
+        "From e = 0.5 degrees up, the velocity error of `adaptive` is smaller than that of (9), (10), (11) "
         "of aranovskiy2020, which take e for zero.",
         assumes={"push": "none", "e": "0.5 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=all((by_observer["adaptive"] < by_observer[name])[1:].all() for name in OBSERVERS[1:]),
-        conditions=remark,
+        conditions=f"As above, {worlds} worlds a bias, the observer in the loop, no push. Without bias there "
+        "is nothing to learn, and learning costs noise: there, homogeneous has "
+        f"{means['homogeneous'][0]:.3f} and adaptive {means['adaptive'][0]:.3f} rad/s.",
         figures={"bias_deg": biases}
         | {f"{name}_velocity_rms_error_rad_s": values for name, values in means.items()}
         | {f"{name}_half_interval_rad_s": values for name, values in halves.items()},
-        pictures=[Picture("dao2023-rig-velocity", title, [panel])],
+        picture=Picture(
+            "dao2023-rig-velocity",
+            f"dao2023, on the six-body rig: velocity RMS error in the loop ({worlds} worlds, 95 % intervals)",
+            [panel],
+        ),
         is_ours=True,
     )
 
@@ -148,15 +148,14 @@ def torques(seed: int = 52_000, worlds: int = 4) -> Claim:
     push = Push(start_s=0.0, duration_s=DURATION_S, torque_n_m=0.1)
     settings = "observer.bias=false", "observer.torque=true", "observer.known_bias_deg=0.5"
     constant = or_inf(rms(late(seed + 1, [0.5] * worlds, [push], *settings)["estimate/adaptive/torque_n_m"] - 0.1))
-    remark = f"As above, {worlds} worlds; a torque of 0.3 N m at 1 Hz with e unknown; 0.1 N m, constant, with e known."
     better = (gait["knowing_rad_s"] < gait["not_knowing_rad_s"]).all()
     return Claim(
-        place="On the rig: disturbance torques",
-        statement="`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant "
-        "torque too.",
+        "On the rig: disturbance torques",
+        "`adaptive` finds a sinusoidal torque of known frequency, and the state in spite of it; a constant torque too.",
         assumes={"push": "0.3 N m at 1 Hz, or 0.1 N m", "e": "0.3 to 1.5 deg", "noise": "400 ug/rtHz"},
         holds=better and gait["disturbance_n_m"].max() < 0.06 and constant.max() < 0.02,
-        conditions=remark,
+        conditions=f"As above, {worlds} worlds; a torque of 0.3 N m at 1 Hz with e unknown; 0.1 N m, constant, with e "
+        "known.",
         figures={**gait, "constant_torque_rms_error_n_m": constant},
         is_ours=True,
     )

@@ -12,7 +12,7 @@ from cmg_mj.papers.claim import Claim
 from cmg_mj.papers.dao2023 import paper
 from cmg_mj.papers.dao2023.figures import Errors, follow, make_proposed, make_single, motion, starts
 from cmg_mj.papers.dao2023.observer import Array, FriedlandTacker
-from cmg_mj.papers.recorded import largest_size
+from cmg_mj.papers.recorded import largest_size, runge_kutta
 
 # --- The misprints, and the settings of the simulation that the paper leaves open ---
 
@@ -29,8 +29,8 @@ def sampling_claim() -> Claim:
     """Judge a sampled observer at Sigma = 1000; an explicit step is shown beside it, and does not count."""
     rms = follow_at_1000(starts(1, 4)).tail_rms()[0]
     return Claim(
-        place="Section 3.2, simulation",
-        statement="The observer is simulated at Sigma = 1000 (the paper does not say how).",
+        "Section 3.2, simulation",
+        "The observer is simulated at Sigma = 1000 (the paper does not say how).",
         assumes={"initial values": f"{len(rms)} motions", "control rate": "200 Hz", "method": "our implicit step"},
         holds=rms.max() < 0.1,
         figures={
@@ -58,12 +58,12 @@ def explicit_escape() -> float:
     q = motion(starts(0, 1), t)[:, 0, 0]
     s = np.zeros(14)
     for k, time in enumerate(t[:-1].tolist()):
-        middle = (q[k] + q[k + 1]) / 2.0
-        k1 = observer_slope(observer, time, s, q[k])
-        k2 = observer_slope(observer, time + DT / 2.0, s + DT / 2.0 * k1, middle)
-        k3 = observer_slope(observer, time + DT / 2.0, s + DT / 2.0 * k2, middle)
-        k4 = observer_slope(observer, time + DT, s + DT * k3, q[k + 1])
-        s = s + DT / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        angles = {0.0: q[k], 0.5: (q[k] + q[k + 1]) / 2.0, 1.0: q[k + 1]}
+
+        def slope(share: float, s: Array, time: float = time, angles: dict[float, float] = angles) -> Array:
+            return observer_slope(observer, time + share * DT, s, angles[share])
+
+        s = runge_kutta(slope, s, DT)
         if not largest_size(s) < 1e9:
             return time + DT
     return math.inf
@@ -80,8 +80,8 @@ def misprint_claim() -> Claim:
         "(7) needs B2 u and the hats of its estimates; the example has B2 = 0, so that it does not show there.",
     ]
     return Claim(
-        place="L, (7), (10), (14) as printed",
-        statement="L = -[1 1] makes A + L C2 Hurwitz, and (14) is (10) rearranged.",
+        "L, (7), (10), (14) as printed",
+        "L = -[1 1] makes A + L C2 Hurwitz, and (14) is (10) rearranged.",
         holds=paper.L.shape[1] == outputs and np.all(polynomial > 0.0) and min(by_10, by_14) < 0.025,
         conditions=" ".join(filter(None, corrections)),
         figures={
@@ -111,8 +111,8 @@ def separated_errors() -> Claim:
     found["200_hz_sigma_1000"] = sampled_deviation(40.0)
     errors = {name: error for name, (error, _) in found.items()}
     return Claim(
-        place="Equations (7) to (9)",
-        statement="With T from (8), the error of the state decouples from that of the exosystem.",
+        "Equations (7) to (9)",
+        "With T from (8), the error of the state decouples from that of the exosystem.",
         is_general=True,
         assumes={"initial values": "one motion", "control rate": "200 Hz"},
         holds=max(errors.values()) < 1e-8,
@@ -202,16 +202,13 @@ def upsilon(duration: float = 15.0, seed: int = 0) -> Claim:
         a, b = proposed.step(a, system, np.zeros(1), y[k]), plain.step(b, turned_system, np.zeros(1), y[k])
         gaps.append((largest_size(b.T - a.T @ expm(paper.A_M * t[k])), largest_size(a.x - b.x)))
     matrix_gap, estimate_gap = np.max(gaps, axis=0).tolist()
-    correction = (
-        "For any system, of which the pendulum robot was tried. Upsilon's equation must have "
-        "(B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the proposed observer is the "
-        "conventional one of the constant xm(0): its estimate of x is the same."
-    )
     return Claim(
-        place="Section 2.2, last equation",
-        statement="The conventional observer's Upsilon is T exp(Am t).",
+        "Section 2.2, last equation",
+        "The conventional observer's Upsilon is T exp(Am t).",
         is_general=True,
         holds=matrix_gap < 1e-9 and estimate_gap < 1e-9,
-        conditions=correction,
+        conditions="For any system, of which the pendulum robot was tried. Upsilon's equation must have "
+        "(B0 + L D20) Cm exp(Am t), not (B0 + L D20), unless Am = 0. So read, the proposed observer is the "
+        "conventional one of the constant xm(0): its estimate of x is the same.",
         figures={"upsilon_gap": matrix_gap, "state_gap": estimate_gap},
     )

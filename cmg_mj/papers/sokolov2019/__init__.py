@@ -6,7 +6,7 @@ from cmg_mj.papers import plvcc
 from cmg_mj.papers.claim import Section, section
 from cmg_mj.papers.sokolov2019 import bearing, equations, figure_3, section_5
 
-SECTIONS: list[Section] = [
+SECTIONS = [
     section("the equations", 0.1, equations.table_i, equations.equations_of_motion, equations.law_equilibria),
     section("the observers' bias", 1.2, equations.biased_luenberger, equations.homogeneous_vicinity),
     section("Proposition 1", 1.3, lambda: plvcc.claim("sokolov2019")),

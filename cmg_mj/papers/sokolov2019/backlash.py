@@ -13,7 +13,6 @@ from cmg_mj.papers.sokolov2019.figure_3 import L1, WITH_Y2, stiffness
 from cmg_mj.papers.sokolov2019.lag import RELEASE, first_crossing, is_sustained, linearise
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import experiment
-from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.side_by_side import run_jobs, run_of
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
@@ -53,17 +52,13 @@ def make_release(observer: str, arcmin: float = GAP_ARCMIN, **parameters: Any) -
 
 def find_cycles(releases: Sequence[Experiment]) -> list[Cycle]:
     """Find the cycles that rigs let go end in, one world each: size and main frequency over the last window."""
-    return [_cycle(trajectory_of(result)) for result in run_jobs([run_of(release, 1) for release in releases])]
-
-
-def _cycle(trajectory: Trajectory) -> Cycle:
-    last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
-    x2, t = last["x2_rad_s"], last["time_s"]
-    return Cycle(
-        is_sustained(trajectory, WINDOW_S)[0],
-        np.degrees(np.ptp(last["x1_rad"])) / 2.0,
-        peak_frequency(x2 - x2.mean(), t[1] - t[0], np.hanning(len(x2))),
-    )
+    found = []
+    for trajectory in map(trajectory_of, run_jobs([run_of(release, 1) for release in releases])):
+        last = trajectory.between(RELEASE_S - WINDOW_S, RELEASE_S)
+        x2, t = last["x2_rad_s"], last["time_s"]
+        frequency = peak_frequency(x2 - x2.mean(), t[1] - t[0], np.hanning(len(x2)))
+        found.append(Cycle(is_sustained(trajectory, WINDOW_S)[0], np.degrees(np.ptp(last["x1_rad"])) / 2.0, frequency))
+    return found
 
 
 def peak_frequency(signals: np.ndarray, dt: float, taper: np.ndarray | float = 1.0) -> float:

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.laws import StateFeedback
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.linear_check import mass_matrix, poles_as_pairs
 from cmg_mj.papers.recorded import largest_size, push_intervals, rms, trace, trajectory_of
 from cmg_mj.papers.sokolov2019.rig import PUSH_AND_NOISE, experiment, read_servo
@@ -51,12 +51,12 @@ CASES = {
 class Motion(NamedTuple):
     """Joint angles, rates and accelerations of one cube's rig without yaw: q_b, q_c, q_d, each (..., 3) in SI units."""
 
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
+    q: Array
+    v: Array
+    a: Array
 
 
-def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
+def vertical_torque(plant: Plant, motion: Motion) -> Array:
     """Return dH/dt of the module's docstring, (...) [N m]."""
     r, inertia = plant.reduced, read_servo(plant).inertia
     q_b, x3 = motion.q[..., 0], motion.q[..., 1] - plant.axis.modules[0].gimbal_zero
@@ -72,12 +72,12 @@ def vertical_torque(plant: Plant, motion: Motion) -> np.ndarray:
 class Locked(NamedTuple):
     """A run on a locked bearing, one row a control tick."""
 
-    time_s: np.ndarray
+    time_s: Array
     motion: Motion
-    torque: np.ndarray
+    torque: Array
     """Torque of the bearing about the vertical, by MuJoCo's inverse dynamics, (n_ticks,) [N m]."""
 
-    def torque_between(self, start_s: float, end_s: float) -> np.ndarray:
+    def torque_between(self, start_s: float, end_s: float) -> Array:
         """Return the torque between two times, (n_ticks,) [N m]."""
         return self.torque[(self.time_s > start_s) & (self.time_s < end_s)]
 
@@ -125,11 +125,6 @@ class Study(NamedTuple):
     free: Mapping[str, Result]
     """Case -> runs on a free bearing."""
 
-    @property
-    def mean_torque(self) -> np.ndarray:
-        """The torque without most of its noise: the mean over the worlds, (n_ticks,) [N m]."""
-        return np.mean([run.torque for run in self.locked], axis=0)
-
 
 def study(worlds: int = WORLDS, seed: int = SEED) -> Study:
     """Run them all."""
@@ -173,6 +168,23 @@ def claim(runs: Study) -> Claim:
     error = max(largest_size(vertical_torque(plant, run.motion) - run.torque) for run in runs.locked)
     peak = mean_interval([largest_size(run.torque_between(1.0, 1.6)) for run in runs.locked])
     pair = largest_size(runs.pair.torque)
+    mean_torque = np.mean([run.torque for run in runs.locked], axis=0)  # without most of its noise
+    example, pushed = runs.locked[0], trajectory_of(runs.free[PUSHED]).world(0)
+    t, push = example.time_s, push_intervals(pushed)
+    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
+    torques = [
+        Line(t, example.torque, "on the bearing", color=1, width=0.5),
+        Line(t, mean_torque, f"mean of {worlds} seeds", color=3, width=1.2),
+        Line(runs.pair.time_s, runs.pair.torque, "scissored pair", color=2),
+    ]
+    panels = [
+        Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
+        Panel("tilt [deg]", [trace(pushed, "x1_rad", color=0)], "free bearing", shaded=push),
+        Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
+        Panel("gimbal angle [deg]", [trace(pushed, "x3_rad", color=0)], shaded=push),
+        Panel("torque about the\nvertical [N m]", torques, shaded=push),
+        Panel("yaw rate [rad/s]", [trace(pushed, "rate/yaw_rad_s", color=1)], shaded=push),
+    ]
     free = {
         case: {
             "fell_fraction": result.fell.mean(),
@@ -181,15 +193,15 @@ def claim(runs: Study) -> Claim:
         for case, result in runs.free.items()
     }
     return Claim(
-        place="Fig. 2, the bearing",
-        statement="The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
+        "Fig. 2, the bearing",
+        "The pendulum has one degree of freedom, its tilt: there is no yaw in (1).",
         assumes={**PUSH_AND_NOISE, "bearing": "locked"},
         holds=error < 1e-9 and pair < 1e-6 * peak.mean,
         conditions="It is so with the thrust bearing locked. On a free bearing the tilt turns the rig about the "
         "vertical, and the law lets the rig fall.",
         figures={
             "peak_torque_at_push_n_m": peak,
-            "peak_of_the_mean_torque_n_m": largest_size(runs.mean_torque),
+            "peak_of_the_mean_torque_n_m": largest_size(mean_torque),
             "rms_torque_before_push_n_m": mean_interval([rms(run.torque_between(0.5, 1.0)) for run in runs.locked]),
             "closed_form_error_n_m": error,
             "peak_torque_of_the_pair_n_m": pair,
@@ -197,26 +209,10 @@ def claim(runs: Study) -> Claim:
             "free": free,
             "worlds": worlds,
         },
-        pictures=[_picture(runs, plant)],
+        picture=Picture(
+            "sokolov2019-bearing",
+            "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s",
+            panels,
+            columns=2,
+        ),
     )
-
-
-def _picture(runs: Study, plant: Plant) -> Picture:
-    example, free = runs.locked[0], trajectory_of(runs.free[PUSHED]).world(0)
-    t, push = example.time_s, push_intervals(free)
-    x1, x3 = example.motion.q[:, 0] - plant.tilt_zero, example.motion.q[:, 1] - plant.axis.modules[0].gimbal_zero
-    torques = [
-        Line(t, example.torque, "on the bearing", color=1, width=0.5),
-        Line(t, runs.mean_torque, f"mean of {len(runs.locked)} seeds", color=3, width=1.2),
-        Line(runs.pair.time_s, runs.pair.torque, "scissored pair", color=2),
-    ]
-    panels = [
-        Panel("tilt [deg]", [Line(t, np.degrees(x1), color=0)], "locked bearing", shaded=push),
-        Panel("tilt [deg]", [trace(free, "x1_rad", color=0)], "free bearing", shaded=push),
-        Panel("gimbal angle [deg]", [Line(t, np.degrees(x3), color=0)], shaded=push),
-        Panel("gimbal angle [deg]", [trace(free, "x3_rad", color=0)], shaded=push),
-        Panel("torque about the\nvertical [N m]", torques, shaded=push),
-        Panel("yaw rate [rad/s]", [trace(free, "rate/yaw_rad_s", color=1)], shaded=push),
-    ]
-    title = "sokolov2019, Fig. 2: one gimbal on its thrust bearing, the exact rate in the law, a push at 1 s"
-    return Picture("sokolov2019-bearing", title, panels, columns=2)

@@ -30,8 +30,8 @@ def table_i() -> Claim:
     table = paper.printed_model()
     error = model_difference(experiment().plant.reduced, table)
     return Claim(
-        place="Table I",
-        statement="Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
+        "Table I",
+        "Mass, pivot distance and inertias; J1 = I_d + J_b + K_c + m l^2, J2 = J_c - I_d + J_d - K_c.",
         holds=error < 1e-9,
         figures={**constants_of(table), "largest_relative_difference": error},
     )
@@ -58,8 +58,8 @@ def equations_of_motion(states: int = 300, seed: int = 81_000) -> Claim:
     residual = equation_residual(plant, model, states, seed)
     opposite = equation_residual(plant, replace(model, J2=-model.J2), states, seed)
     return Claim(
-        place="(1)",
-        statement="The Euler-Lagrange equations of frame, gimbal and wheel.",
+        "(1)",
+        "The Euler-Lagrange equations of frame, gimbal and wheel.",
         holds=residual < 1e-9 and opposite > 1e3 * residual,
         figures={"largest_residual_n_m": residual, "largest_residual_with_J2_turned_n_m": opposite, "states": states},
     )
@@ -71,8 +71,8 @@ def law_equilibria() -> Claim:
     error, margin = finite_difference_error(model), controllability_margin(model.A_e, model.B_e)
     is_so, figures = law_rests(model, paper.K_E, 6, 7)
     return Claim(
-        place="(5), (6), (7)",
-        statement="A, B linearise (3) and (A_e, B_e) is controllable; (6) leaves the gimbal at -k1/k3 e, (7) brings x "
+        "(5), (6), (7)",
+        "A, B linearise (3) and (A_e, B_e) is controllable; (6) leaves the gimbal at -k1/k3 e, (7) brings x "
         "to zero with x_e at -k_e1/k_e4 e.",
         holds=error < 1e-6 and margin > 1e-9 and is_so,
         conditions="With y1 = x1 - e the bias enters (6) and (7) as +k1 e: both offsets have a plus where a minus is "
@@ -112,9 +112,8 @@ def biased_luenberger(e_deg: float = 0.25) -> Claim:
         for angles, (x, rate, x_e) in rests.items()
     )
     return Claim(
-        place="Section IV-B",
-        statement="A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to "
-        "zero.",
+        "Section IV-B",
+        "A - L C is Hurwitz; with a bias e the estimate of (9) is off, but the integrator still brings x to zero.",
         assumes={"e": f"{e_deg:g} deg"},
         holds=is_as_foreseen and np.real(poles).max() < 0.0,
         conditions="With y1 = x1 - e the bias enters y as -C_e e and the error as +L C_e e; the other sign is printed.",
@@ -135,9 +134,8 @@ def homogeneous_vicinity(biases_deg: Sequence[float] = (0.0, 0.25, 0.5)) -> Clai
     rates = {f"{e:g}_deg": find_rest("homogeneous", e, "measured")[1] for e in biases_deg}
     forms = {f"{e:g}_deg": paper.rest_of_10(model, math.radians(e)) for e in biases_deg}
     return Claim(
-        place="Section IV-C",
-        statement="With alpha in (1/2, 1] the error of (10) converges to a vicinity of the origin: sin(y1) replaces "
-        "sin(x1).",
+        "Section IV-C",
+        "With alpha in (1/2, 1] the error of (10) converges to a vicinity of the origin: sin(y1) replaces sin(x1).",
         is_general=True,
         assumes={"e": f"{', '.join(f'{e:g}' for e in biases_deg)} deg"},
         holds=max(abs(rates[e] - forms[e]) / max(abs(forms[e]), 5e-3) for e in rates) < 0.1,

@@ -11,7 +11,7 @@ from scipy.signal import lsim, lti
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import Observer
-from cmg_mj.papers.claim import Claim, OnShare
+from cmg_mj.papers.claim import Array, Claim, OnShare
 from cmg_mj.papers.recorded import open_loop_panels, rms, trace, trajectory_of
 from cmg_mj.papers.retuned import Pushes, Studies, figures_of, tune_all
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS, TABLE_II
@@ -25,7 +25,7 @@ from cmg_mj.view.plots.figure import Picture
 SEED, WORLDS = 82_000, 20
 AFTER_S = 0.5
 """The push's window ends so long after the push."""
-ASSUMED: Mapping[str, str] = {**PUSH_AND_NOISE, "e": "0.5 deg"}
+ASSUMED = {**PUSH_AND_NOISE, "e": "0.5 deg"}
 WITH_Y2 = "luenberger and y2"
 L1, L2 = (row[0] for row in TABLE_II["luenberger"]["L"][:2])
 """Gains of (9) on y1 less its estimate [1/s, 1/s^2]."""
@@ -50,15 +50,10 @@ class Tuning(NamedTuple):
 
     prepared: Experiment
     trajectory: Trajectory
-    rates: Mapping[str, np.ndarray]
+    rates: Mapping[str, Array]
     """Estimated tilt rates, (n_ticks, n_worlds) [rad/s]."""
-    window: np.ndarray
+    window: Array
     """True for ticks between the push's start and half a second after its end, (n_ticks,)."""
-
-    @property
-    def error_of_9(self) -> np.ndarray:
-        """Estimated less true rate, mean over the worlds, (n_ticks,) [rad/s]."""
-        return (self.rates["luenberger"] - self.trajectory["x2_rad_s"]).mean(axis=1)
 
     @property
     def relative_errors(self) -> dict[str, Interval]:
@@ -78,7 +73,7 @@ def tuning_experiment(worlds: int = WORLDS, seed: int = SEED) -> Tuning:
     return Tuning(prepared, trajectory, rates, (t >= push.start_s) & (t <= push.end_s + AFTER_S))
 
 
-def predict_error(tuning: Tuning) -> np.ndarray:
+def predict_error(tuning: Tuning) -> Array:
     """Return the error in the rate of (9) that the push alone makes, (n_ticks,) [rad/s].
 
     The observer does not know the push: d/J1 passes through (s + 20)/(s^2 + 20 s + 150 - M/J1), with the sign turned.
@@ -105,9 +100,12 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     """Judge Fig. 3: (9) must be worse than an estimate of zero and than the others, beyond chance."""
     (push,) = tuning.prepared.scenario.push
     at_end = np.argmin(np.abs(tuning.trajectory["time_s"] - push.end_s))
+    run = tuning.trajectory.world(0).between(0.0, 3.0)
+    tilt = trace(run, "y1_rad", "y1", color=7, width=0.8)
+    rates = {name: rate[: len(tilt.x), 0] for name, rate in tuning.rates.items()}
     return Claim(
-        place="Fig. 3",
-        statement="At the push, (9) fails completely to estimate x2.",
+        "Fig. 3",
+        "At the push, (9) fails completely to estimate x2.",
         assumes=ASSUMED,
         holds=relative["luenberger"].low > max(1.0, relative["linear"].high, relative["homogeneous"].high),
         conditions="(10) fails there too, if less: so does every estimator that takes the command's effect for motion.",
@@ -117,7 +115,11 @@ def misses_the_push(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
             "rate_at_push_end_gyro_rad_s": mean_interval(tuning.trajectory["fog_rad_s"][at_end]),
             "worlds": tuning.rates["luenberger"].shape[1],
         },
-        pictures=[_picture(tuning)],
+        picture=Picture(
+            "sokolov2019-fig-3",
+            "sokolov2019, Fig. 3: the law fed by the gyro, a push at 1 s (0.5 N m, 0.1 s; e = 0.5 deg)",
+            open_loop_panels(run, rates, OBSERVERS, tilt, (-1.0, 0.6)),
+        ),
     )
 
 
@@ -125,11 +127,11 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
     """Judge the reason that Section V gives."""
     reach = y2_reaches_the_rate(tuning.prepared)
     with_y2, without_y2 = relative[WITH_Y2], relative["luenberger"]
-    error, window = tuning.error_of_9, tuning.window
+    error, window = (tuning.rates["luenberger"] - tuning.trajectory["x2_rad_s"]).mean(axis=1), tuning.window
     explained_share = 1.0 - np.var((error - predict_error(tuning))[window]) / np.var(error[window])
     return Claim(
-        place="Section V, (9) and y2",
-        statement="(9) ignores y2 completely, and thus is not robust against external disturbances.",
+        "Section V, (9) and y2",
+        "(9) ignores y2 completely, and thus is not robust against external disturbances.",
         assumes=ASSUMED,
         holds={"y2 is ignored": reach == 0.0, "the push is missed for this reason": with_y2.high < 1.0},
         otherwise="(9) does ignore y2, but does not miss the push for this reason: with y2 it misses the push as well.",
@@ -141,14 +143,6 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
             "variance_explained_by_the_unknown_push": explained_share,
         },
     )
-
-
-def _picture(tuning: Tuning) -> Picture:
-    run = tuning.trajectory.world(0).between(0.0, 3.0)
-    tilt = trace(run, "y1_rad", "y1", color=7, width=0.8)
-    rates = {name: rate[: len(tilt.x), 0] for name, rate in tuning.rates.items()}
-    title = "sokolov2019, Fig. 3: the law fed by the gyro, a push at 1 s (0.5 N m, 0.1 s; e = 0.5 deg)"
-    return Picture("sokolov2019-fig-3", title, open_loop_panels(run, rates, OBSERVERS, tilt, (-1.0, 0.6)))
 
 
 def claims() -> list[Claim]:
@@ -176,8 +170,8 @@ def scenario_of(name: str, settings: Sequence[str], seed: int = TUNING_SEED) -> 
 def tuning_claim(studies: Studies) -> Claim:
     """Judge the printed values: at one noise of one push, is none of the tuned better on the held-out seeds?"""
     return Claim(
-        place="Table II, tuning",
-        statement="tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
+        "Table II, tuning",
+        "tau, L and [k1, k2, alpha] were tuned, on one recording, to fit the gyro best.",
         assumes={"push": "; ".join(studies), "noise": "100, 400, 1600 ug/rtHz"},
         missing_data="The paper gives neither the recording that its estimators were tuned on, nor its push, e and "
         "noise.",

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from cmg_mj.core.reduced_model import ReducedModel, hold_matrices
 from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.observers import Measurement, Observer
-from cmg_mj.papers.claim import Claim
+from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.papers.recorded import trajectory_of
 from cmg_mj.papers.sokolov2019.paper import OBSERVERS
 from cmg_mj.papers.sokolov2019.rig import FINE, NO_NOISE, Servo, estimator, experiment, make_rig, read_servo
@@ -31,7 +31,7 @@ from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
 
 
-def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[Array, Array]:
     """Linearise sokolov2019 (1) with the servo's torque upright: x' = A x + B u.
 
     The state is tilt, tilt rate, gimbal angle, gimbal rate and setpoint. The flywheel's torque -J_d w_d x2 drives the
@@ -53,7 +53,7 @@ def rig_matrices(model: ReducedModel, servo: Servo) -> tuple[np.ndarray, np.ndar
 
 def period_map(
     experiment: Experiment, observer: Observer | None, servo: Servo, age_steps: int = 0, share: complex = 1.0
-) -> np.ndarray:
+) -> Array:
     """Return the matrix that takes the loop from one control tick to the next.
 
     Args:
@@ -72,7 +72,7 @@ def period_map(
     start: Any = observer.init(Measurement(0.0, 0.0)) if observer else ()
     parts = np.cumsum([5, age_steps, len(start)])
 
-    def period(v: np.ndarray) -> np.ndarray:
+    def period(v: Array) -> Array:
         rig, pending_tilts, observer_state, (x_e, u) = np.split(v, parts)
         y1, y2 = (pending_tilts[-1] if age_steps else rig[0]), rig[2]
         x2 = rig[1]
@@ -88,14 +88,14 @@ def period_map(
     return np.column_stack([period(unit) for unit in np.eye(parts[-1] + 2)])
 
 
-def modes(matrix: np.ndarray, dt: float) -> np.ndarray:
+def modes(matrix: Array, dt: float) -> Array:
     """Return the poles s = log(z)/dt of a period's map, the least damped first [1/s]."""
     z = np.linalg.eigvals(matrix)
     s = np.log(z[np.abs(z) > 1e-9].astype(complex)) / dt
     return s[np.argsort(-s.real)]
 
 
-def oscillation(matrix: np.ndarray, dt: float) -> complex:
+def oscillation(matrix: Array, dt: float) -> complex:
     """Find the least damped oscillating pole with a frequency above 1 rad/s [1/s]: the integrator's pair is slower."""
     return complex(next(s for s in modes(matrix, dt) if s.imag > 1.0))
 
@@ -138,7 +138,7 @@ MAX_LATENCY_STEPS = 64
 """The largest latency tried [physics steps]."""
 
 
-def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> np.ndarray:
+def is_sustained(trajectory: Trajectory, window_s: float = WINDOW_S) -> Array:
     """Find the worlds of a release that oscillate without end, grow or fall, (n_worlds,).
 
     Sustained: the tilt rate's peak over the last window is at least 98 % of that over the window before, and above 1e-3
@@ -165,11 +165,11 @@ def releases(servos: Mapping[str, Sequence[Servo]], settings: Sequence[str] = ()
 class Sweep(NamedTuple):
     """Releases over the servo's lag."""
 
-    lags_s: np.ndarray
+    lags_s: Array
     """(n_lags,)."""
-    sustained: np.ndarray
+    sustained: Array
     """True where the loop oscillates by itself, (n_lags,)."""
-    amplitude_deg: np.ndarray
+    amplitude_deg: Array
     """Largest tilt over the last two seconds, (n_lags,); NaN where the rig fell."""
 
 
@@ -195,12 +195,9 @@ def lag_thresholds(sweeps: Mapping[str, Sweep]) -> dict[str, Threshold]:
     thresholds: dict[str, Threshold] = {}
     servo = read_servo(experiment().plant)
     for observer, (lags, sustained, _) in sweeps.items():
-        first = np.argmax(sustained)
-        if not sustained.any():
-            thresholds[observer] = lags[-1], None
-        elif first == 0:
-            thresholds[observer] = 0.0, lags[0]
-        else:
+        thresholds[observer] = lags[-1], None
+        if sustained.any():
+            first = np.argmax(sustained)
             grid = np.linspace(lags[first - 1], lags[first], PARTS + 1)
             refined = releases({observer: [servo.damp(lag) for lag in grid[1:]]})[observer]
             i = np.argmax(is_sustained(refined))  # the last of them is the sweep's own
@@ -228,7 +225,7 @@ def latency_threshold(observer: str) -> Threshold:
 MAX_LAG_S = 0.12
 """Lags are searched up to here in the linearised loop [s]."""
 
-Loop = Callable[..., np.ndarray]
+Loop = Callable[..., Array]
 """(servo, age_steps=0, share=1.0) -> the map of a control period."""
 
 
@@ -304,24 +301,6 @@ def lags() -> Lags:
 def claim(results: Lags) -> Claim:
     """Judge section V: the differentiator's lag."""
     begin, others = results.thresholds["linear"][1], [results.thresholds[n][0] for n in ("luenberger", "homogeneous")]
-    return Claim(
-        place="Section V, the lag",
-        statement="Finite differences lag, and the lag brings the loop into sustained oscillations.",
-        assumes={"servo": f"a lag of up to {1e3 * MAX_LAG_S:.0f} ms"},
-        holds=begin is not None and begin < min(others),
-        conditions="It does with a slower servo or a later y1; at the model's servo lag the oscillation decays.",
-        figures={
-            "servo_lag_of_the_model_s": results.sweeps["linear"].lags_s[0],
-            "servo_lag_threshold_s": results.thresholds,
-            "latency_threshold_s": results.latencies,
-            "predicted": results.predictions,
-            "tau_threshold_s": largest_tau(),
-        },
-        pictures=[_picture(results)],
-    )
-
-
-def _picture(results: Lags) -> Picture:
     grid, x_label = np.linspace(5e-3, 0.07, 66), "servo lag [ms]"
     rates = [Line([5.0, 70.0], [0.0, 0.0], style="k:", width=0.8)]
     for name in ("linear", "luenberger"):
@@ -332,9 +311,24 @@ def _picture(results: Lags) -> Picture:
         Line(1e3 * s.lags_s, s.amplitude_deg, f"{OBSERVERS[name]} {name}", "os^"[i] + "-", color=name)
         for i, (name, s) in enumerate(results.sweeps.items())
     ]
-    title = "MuJoCo, released at 0.2 deg, no noise"
     panels = [
         Panel("growth of the tilt's\noscillation [1/s]", rates, "linearised and sampled", x_label),
-        Panel("largest tilt after\n4 s [deg]", tilts, title, x_label, y_scale="log"),
+        Panel("largest tilt after\n4 s [deg]", tilts, "MuJoCo, released at 0.2 deg, no noise", x_label, y_scale="log"),
     ]
-    return Picture("sokolov2019-lag", "sokolov2019, Section V: which servo lag brings sustained oscillation", panels)
+    return Claim(
+        "Section V, the lag",
+        "Finite differences lag, and the lag brings the loop into sustained oscillations.",
+        assumes={"servo": f"a lag of up to {1e3 * MAX_LAG_S:.0f} ms"},
+        holds=begin is not None and begin < min(others),
+        conditions="It does with a slower servo or a later y1; at the model's servo lag the oscillation decays.",
+        figures={
+            "servo_lag_of_the_model_s": results.sweeps["linear"].lags_s[0],
+            "servo_lag_threshold_s": results.thresholds,
+            "latency_threshold_s": results.latencies,
+            "predicted": results.predictions,
+            "tau_threshold_s": largest_tau(),
+        },
+        picture=Picture(
+            "sokolov2019-lag", "sokolov2019, Section V: which servo lag brings sustained oscillation", panels
+        ),
+    )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.papers.sokolov2019.paper import TABLE_II
@@ -20,26 +20,22 @@ NO_NOISE = (
     "sensors.fog.angle_random_walk_deg_rth=0.0",
 )
 
-PUSH_AND_NOISE: Mapping[str, str] = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
+PUSH_AND_NOISE = {"push": "0.5 N m for 0.1 s", "noise": "400 ug/rtHz"}
 """Data of its experiments that the paper does not give, beside e: the scenario single_gimbal."""
 
 FINE = "plant.timestep_s=0.001"
 """A servo that is slow because of its damping is stiff: it asks for a smaller step than the rig's own."""
 
 
-@dataclass(frozen=True)
-class Servo:
-    """A gimbal's position loop; its setpoint is the integral of the commanded rate.
-
-    Attributes:
-        kp: Stiffness [N m/rad].
-        kv: Damping [N m s/rad].
-        inertia: I_c + I_d [kg m^2].
-    """
+class Servo(NamedTuple):
+    """A gimbal's position loop; its setpoint is the integral of the commanded rate."""
 
     kp: float
+    """Stiffness [N m/rad]."""
     kv: float
+    """Damping [N m s/rad]."""
     inertia: float
+    """I_c + I_d [kg m^2]."""
 
     @property
     def lag_s(self) -> float:
@@ -48,12 +44,12 @@ class Servo:
 
     def damp(self, lag_s: float) -> Servo:
         """Return a servo as stiff, with another lag: more damping."""
-        return replace(self, kv=lag_s * self.kp)
+        return self._replace(kv=lag_s * self.kp)
 
     def soften(self, lag_s: float) -> Servo:
         """Return a critically damped servo with another lag: less stiffness."""
         kp = 4.0 * self.inertia / lag_s**2
-        return replace(self, kp=kp, kv=lag_s * kp)
+        return Servo(kp, lag_s * kp, self.inertia)
 
 
 def experiment(settings: Sequence[str] = (), observer: str = "homogeneous", feedback: str = "observer") -> Experiment:

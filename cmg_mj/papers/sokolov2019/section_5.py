@@ -110,7 +110,7 @@ def is_better(a: Result, b: Result, key: str = VELOCITY) -> bool:
 
 # --- Figs 4 to 6 --------------------------------------------------------------------------------------------
 
-LET_GO: Mapping[str, str] = {
+LET_GO = {
     "backlash": f"{GAP_ARCMIN:g} arcmin",
     "friction": "it holds the gimbal in the gap",
 }
@@ -118,7 +118,7 @@ HELD = (
     f"With {GAP_ARCMIN:g} arcmin of backlash behind the servo's motor, as its datasheet has it, and friction that "
     "holds the gimbal in the gap. The paper mentions neither."
 )
-ALL_SETTINGS: Mapping[str, str] = {
+ALL_SETTINGS = {
     **PUSH_AND_NOISE,
     "e": f"up to {max(BIASES_DEG):g} deg",
     "backlash": f"0 and {GAP_ARCMIN:g} arcmin",
@@ -157,13 +157,13 @@ def oscillation(
 ) -> Claim:
     """Judge Fig. 4 or 5: whether the loop oscillates without end, let go behind the gap."""
     return Claim(
-        place=f"Fig. {NUMBERS[name]}",
-        statement=statement,
+        f"Fig. {NUMBERS[name]}",
+        statement,
         assumes={**PUSH_AND_NOISE, "e": f"{SHOWN_DEG:g} deg", **LET_GO},
         holds=cycles.ends[name].sustained,
         conditions=f"{HELD} {without_backlash}",
         figures={**_figures(loops, name, cycles), **figures},
-        pictures=[picture(name, loops)],
+        picture=picture(name, loops),
     )
 
 
@@ -202,8 +202,8 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
     """Judge the cause that Section V gives for the oscillation with (9)."""
     without_y2, with_y2 = cycles.ends["luenberger"], cycles.ends[WITH_Y2]
     return Claim(
-        place="Section V, the cause of Fig. 5",
-        statement="(9) makes the system oscillate because the linearisation does not fit its behaviour.",
+        "Section V, the cause of Fig. 5",
+        "(9) makes the system oscillate because the linearisation does not fit its behaviour.",
         assumes=LET_GO,
         holds=without_y2.sustained and with_y2.amplitude_deg < 0.5 * without_y2.amplitude_deg,
         otherwise="The terms that the linearisation leaves out change next to nothing. The gap makes the oscillation, "
@@ -221,12 +221,12 @@ def figure_6(loops: Loops, cycles: Cycles) -> Claim:
     """Judge (10): stabilised."""
     falls = max(by_name["homogeneous"].fell.mean() for by_name in loops.all_settings.values())
     return Claim(
-        place="Fig. 6",
-        statement="With (10) in the loop the system is stabilised.",
+        "Fig. 6",
+        "With (10) in the loop the system is stabilised.",
         assumes=ALL_SETTINGS,
         holds=falls == 0.0,
         figures=_figures(loops, "homogeneous", cycles) | {"largest_fell_fraction": falls},
-        pictures=[picture("homogeneous", loops)],
+        picture=picture("homogeneous", loops),
     )
 
 
@@ -234,8 +234,8 @@ def figure_6_at_rest(cycles: Cycles) -> Claim:
     """Judge (10): without the oscillations of the others, on the rig on which they have them."""
     eight, nine, ten = (cycles.ends[name] for name in OBSERVERS)
     return Claim(
-        place="Fig. 6, beside Figs 4 and 5",
-        statement="With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
+        "Fig. 6, beside Figs 4 and 5",
+        "With (10) in the loop the oscillations of Figs 4 and 5 are not there.",
         assumes=LET_GO,
         missing_data="The paper does not say what makes (8) and (9) oscillate, nor how wide a gap its servo has.",
         holds=(eight.sustained or nine.sustained) and not ten.sustained,
@@ -255,9 +255,8 @@ def best(loops: Loops, key: str) -> Claim:
         for setting, by_name in loops.all_settings.items()
     }
     return Claim(
-        place=f"Section V, the comparison: {KEYS[key]}",
-        statement="The nonlinear differentiator (10) offers the best behaviour of the three; judged by the "
-        f"{KEYS[key]}.",
+        f"Section V, the comparison: {KEYS[key]}",
+        f"The nonlinear differentiator (10) offers the best behaviour of the three; judged by the {KEYS[key]}.",
         assumes=ALL_SETTINGS,
         holds=wins,
         otherwise="(8) is better where it fails.",
@@ -279,8 +278,8 @@ def model_based(loops: Loops, key: str) -> Claim:
     """Judge section VI by one measure: with a model better than without, the nonlinear better than the linear one."""
     ranked = {setting: is_ranked(by_name, key) for setting, by_name in loops.all_settings.items()}
     return Claim(
-        place=f"Section VI: {KEYS[key]}",
-        statement="The designs with a model outperform the one without; of them the nonlinear one has the smaller "
+        f"Section VI: {KEYS[key]}",
+        "The designs with a model outperform the one without; of them the nonlinear one has the smaller "
         f"error; judged by the {KEYS[key]}.",
         assumes=ALL_SETTINGS,
         holds=any(ranked.values()),

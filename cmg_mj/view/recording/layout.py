@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -20,8 +19,7 @@ from cmg_mj.view.recording.signals import TIMELINE, Branch, Lines
 PlayState = Literal["paused", "playing", "following"]
 
 
-@dataclass(frozen=True)
-class Plot:
+class Plot(NamedTuple):
     """A plot of time series.
 
     Attributes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -88,8 +89,7 @@ class Run:
         return self.trajectory.observers[1:]
 
 
-@dataclass(frozen=True)
-class LegendEntry:
+class LegendEntry(NamedTuple):
     """A run or an observer as a recording names it.
 
     Attributes:

@@ -11,9 +11,8 @@ import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent import futures
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -45,8 +44,7 @@ LOG_PLOTS = (
 )
 
 
-@dataclass(frozen=True)
-class LogSeries:
+class LogSeries(NamedTuple):
     """The recorded series of one log.
 
     Attributes:

@@ -16,17 +16,17 @@ import pytest
 
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.board import Board, on_a_board, temporary_export
-from cmg_mj.features.board.image import available, build
+from cmg_mj.features.board.image import build
 from cmg_mj.features.board.processor import Decision, run_on
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
-from tests.features.board.toy import SHORT, short
+from tests.features.board.toy import SHORT, available, short
 from tests.tiers import slow_but
 
-pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+pytestmark = pytest.mark.skipif(not available, reason="the cross-compiler, QEMU or CasADi is not installed")
 
 
 @pytest.fixture(autouse=True)
@@ -171,7 +171,9 @@ def test_a_reading_that_is_not_finite_stops_the_board_until_start() -> None:
 
 
 def test_what_the_board_cannot_do_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^controller\.feedback = 'truth': a board has no such sensor"):
+    with pytest.raises(
+        InputError, match=r"^controller\.feedback = 'truth': cannot be exported: C has the observer's rate"
+    ):
         short("linear", "controller.feedback=truth").run(driver="board")
 
 

@@ -8,13 +8,13 @@ import sys
 
 import pytest
 
-from cmg_mj.features.board.image import available
 from cmg_mj.papers.aranovskiy2020 import riccati
 from tests.command import HANGS_AFTER_S, ROOT
+from tests.features.board.toy import available
 
 SCRIPT = ROOT / "benchmarks" / "board.py"
 
-pytestmark = pytest.mark.skipif(not available(), reason="the cross-compiler, QEMU or CasADi is not installed")
+pytestmark = pytest.mark.skipif(not available, reason="the cross-compiler, QEMU or CasADi is not installed")
 
 
 @pytest.mark.slow

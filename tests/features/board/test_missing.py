@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cmg_mj.features.board.image import COMPILER, EMULATOR, SIZE, available, missing
+from cmg_mj.features.board.image import COMPILER, EMULATOR, SIZE, missing
 from tests.command import cmg_mj
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -38,6 +38,5 @@ def test_it_is_said_what_to_install(
     install(programs, *programs_there)
     monkeypatch.setenv("PATH", f"{programs}{os.pathsep}/bin/nowhere")
     assert missing() == packages.split()
-    assert not available()
     assert cmg_mj("run", "push_recovery", "--driver", "board").complaint.endswith(f"apt install {packages}")
     assert not Path("runs").exists()
