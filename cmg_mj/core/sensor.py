@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,11 +88,12 @@ def shown(limit: float, step: float) -> SensorStage:
         limit: Largest reading.
         step: Of the resolution; 0: readings are not rounded.
     """
+    limits, steps = repeat(limit), repeat(step)
 
     def shown(signal: Any, ideal: IdealReading) -> Any:
         if isinstance(signal, np.ndarray):
             return digitise(signal, limit, step)
-        return [digitise(x, limit, step) for x in signal]
+        return list(map(digitise, signal, limits, steps))
 
     return shown
 
@@ -124,7 +126,7 @@ class SampledSensor:
         self._settle = sum(timing.settle for timing in timings)
         self.steps_per_sample = math.gcd(self.period, self._raw, *(timing.grid for timing in timings))
         self._watches = [watch for stage in stages if (watch := getattr(stage, "watch", None))]
-        self._signal, self._stages = signal, stages
+        self._signal, self._stages = IdealReading._fields.index(signal), stages
         self._latency = steps_until(latency_s, site.timestep)
         self._on_the_way: deque[tuple[int, Any]] = deque()
         self._delivered = None
@@ -133,21 +135,19 @@ class SampledSensor:
         """Take what is due at a physics step; at the first one, whichever it is, there must be something to show."""
         for watch in self._watches:
             watch(step, self._raw, ideal)
-        is_first = self._delivered is None
-        if is_first:  # before the start the rig stood still
-            for _ in range(self._settle):
-                self._measure(ideal)
-        elif step % self._raw:
-            return
-        signal = self._measure(ideal)
-        if is_first or step % self.period == 0:
-            if is_first or not self._latency:
-                self._delivered = signal
-            else:
-                self._on_the_way.append((step + self._latency, signal))
+        if self._delivered is None:  # before the start the rig stood still
+            for _ in range(self._settle + 1):
+                self._delivered = self._measure(ideal)
+        elif step % self._raw == 0:
+            signal = self._measure(ideal)
+            if step % self.period == 0:
+                if self._latency:
+                    self._on_the_way.append((step + self._latency, signal))
+                else:
+                    self._delivered = signal
 
     def _measure(self, ideal: IdealReading) -> Any:
-        signal = getattr(ideal, self._signal)
+        signal = ideal[self._signal]
         for stage in self._stages:
             signal = stage(signal, ideal)
         return signal

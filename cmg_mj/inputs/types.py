@@ -127,12 +127,12 @@ def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:
     return marks
 
 
-def marked_values(section: BaseModel, mark: type[Mark]) -> Iterator[tuple[str, float, Mark]]:
+def marked_values(section: BaseModel, mark: type | tuple[type, ...]) -> Iterator[tuple[str, float, Any]]:
     """Go through the numbers of a section that have a mark.
 
     Args:
         section: The section, such as a scenario.
-        mark: The mark's class.
+        mark: The mark's class, or several.
 
     Yields:
         Field, `push.0.torque_n_m`, its value, its mark.

@@ -60,15 +60,15 @@ def stages(
     Returns:
         The three stages, and the terms at sample k.
     """
-
-    def stage(y1: Scalar, terms: Terms) -> Stage:
-        drift, gain, damping = terms
-        return y1, drift + u * gain, u * damping + friction
-
     (y1_before, y2_before), (y1, y2) = before, y
-    y1_middle, after = 0.5 * (y1_before + y1), model.terms(y1 + bias, y2)
-    middle = stage(y1_middle, model.terms(y1_middle + bias, 0.5 * (y2_before + y2)))
-    return stage(y1_before, terms), middle, stage(y1, after), after
+    y1_middle = 0.5 * (y1_before + y1)
+    drift, gain, damping = terms
+    begin = y1_before, drift + u * gain, u * damping + friction
+    drift, gain, damping = model.terms(y1_middle + bias, 0.5 * (y2_before + y2))
+    middle = y1_middle, drift + u * gain, u * damping + friction
+    drift, gain, damping = terms = model.terms(y1 + bias, y2)
+    end = y1, drift + u * gain, u * damping + friction
+    return begin, middle, end, terms
 
 
 def follow(

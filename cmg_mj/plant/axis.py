@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -83,6 +84,15 @@ class Axis:
         return [module.direction for module in self.modules]
 
     @cached_property
+    def _forces_of(self) -> Callable[[Joints], Sequence[float]]:
+        return itemgetter(*self.forces)
+
+    @cached_property
+    def _encoders_of(self) -> Callable[[Joints], Sequence[float]]:
+        (only, *others) = self.encoders
+        return itemgetter(*self.encoders) if others else itemgetter(slice(only, only + 1))
+
+    @cached_property
     def _spins(self) -> list[int]:
         return [module.flywheel_dof for module in self.modules]
 
@@ -103,9 +113,10 @@ class Axis:
         Returns:
             The ideal readings, of the elements' own type (float, or array (n_worlds,)).
         """
-        many = isinstance(sensordata, np.ndarray)
-        forces = sensordata[self.forces] if many else [sensordata[address] for address in self.forces]
-        encoders = [sensordata[address] for address in self.encoders]
+        if isinstance(sensordata, np.ndarray):
+            forces, encoders = sensordata[self.forces], sensordata[self.encoders]
+        else:  # of one world, at every tick
+            forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         wheels = [qvel[dof] for dof in self._spins]
         return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
 

@@ -30,6 +30,7 @@ from cmg_mj.plant.elements import BEND_JOINT, element_id
 from cmg_mj.plant.locking import lock_thrust_bearing
 from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
+from cmg_mj.plant.step_limit import fit_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.plant.turning import turning
 from cmg_mj.scenario.design import PlantNumbers
@@ -86,7 +87,7 @@ class Plant:
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{MIN_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
-        step = grid.physics_step(self.largest_step) if grid else settings.timestep_s
+        step = fit_step(grid, self.largest_step) if grid else settings.timestep_s
         self.model.opt.timestep = step or self.largest_step
         data = self.new_data()
         mujoco.mj_step(self.model, data, int(np.clip(FIRST_S / self.timestep, 4, 100)))
@@ -340,13 +341,15 @@ def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None =
     """
     settings, axes = scenario.plant, scenario.axis_scenarios
     sections = {name: scenario.section(name) for name in entries("edit")}
-    filed = None
-    if like is not None and like.sections == sections and like.settings.compiled_alike(settings):
-        filed = like.filed  # whose file may be gone
+    same = like is not None and like.sections == sections and like.settings.compiled_alike(settings)
     with set_control_callback(None):  # compiling a model runs it
-        rig = filed or build(find("models", settings.model, ".xml", "plant.model ="), settings, sections)
-        plant = Plant(rig, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
-    if filed is None and plant.path.resolve().parent != folder("models").resolve():
+        if like is not None and same:  # whose file may be gone
+            filed = like.filed
+        else:
+            path = find("models", settings.model, ".xml", "plant.model =")
+            filed = build(path, settings, sections)
+        plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
+    if not same and plant.path.resolve().parent != folder("models").resolve():
         _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
     return plant
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.scenario.time_grid import TimeGrid
 
 RK4_LIMIT = 1.5
 """Physics step times the rig's fastest rate: with RK4 the figures of a summary are then within 0.2 % of their limit.
@@ -14,9 +18,34 @@ RK4_LIMIT = 1.5
 RK4 is stable up to 2.8. `docs/studies/steps.py` prints the table. A torque that swings so fast is integrated as by
 Simpson's rule, to 1.5^4/2880 = 0.18 %.
 """
+MAX_STEPS = 1_000_000_000
+"""Most physics steps of a run; so many take hours."""
 Vector = np.ndarray | float
 OTHERS_LIMIT_S = 0.001
 """Largest step of MuJoCo's other integrators; none is as accurate at any step that costs less [s]."""
+
+
+def fit_step(grid: TimeGrid, limit_s: float) -> float:
+    """Fit the physics step of a run.
+
+    Args:
+        grid: The times that whole steps must fill.
+        limit_s: The largest step that is accurate enough for the plant [s]: see `largest_step`.
+
+    Returns:
+        The named step, or the largest within the limit of which a whole number fills the period [s].
+
+    Raises:
+        InputError: The run would have too many steps to come to its end.
+    """
+    step = grid.timestep_s or grid.period_s / math.ceil(grid.period_s / limit_s * (1.0 - 1e-9))
+    steps = grid.duration_s / step
+    if steps > MAX_STEPS:
+        raise InputError(
+            f"duration_s = {grid.duration_s:g}: {steps:.3g} physics steps of {step:g} s; at most "
+            f"{MAX_STEPS:g} are taken, {MAX_STEPS * step:g} s"
+        )
+    return step
 
 
 def largest_step(model: mujoco.MjModel, key: int, own_s: float, shake_rate: float) -> float:

@@ -96,15 +96,18 @@ class FusedGyro:
 
         `self._x1` is the estimate of what is seen, `self._turn` the bias times the sample period.
         """
-        x1, turn, turns = self._x1, self._turn, np.empty_like(seen)
-        for row, (sample, (k1, k2)) in enumerate(zip(seen, gains, strict=True)):
+        single = seen.shape[1] == 1 and isinstance(self._R, float)
+        samples = seen[:, 0].tolist() if single else seen  # a float costs a twentieth of an array of one
+        x1, turn = (self._x1.item(), self._turn.item()) if single else (self._x1, self._turn)
+        turns = []
+        for sample, (k1, k2) in zip(samples, gains, strict=True):
             x1 = x1 - turn
             e = sample - x1
             x1 = x1 + k1 * e
             turn = turn + k2 * e
-            turns[row] = turn
-        self._x1, self._turn = x1, turn
-        return turns
+            turns.append(turn)
+        self._x1, self._turn = np.atleast_1d(x1), np.atleast_1d(turn)
+        return np.array(turns).reshape(seen.shape)
 
     def _next_gains(self, n: int) -> Sequence[tuple[Scalar, Scalar]]:
         """Compute the gains of the next n samples on x1 and on the bias times the sample period.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -17,8 +18,6 @@ SWING_SHARE = 10.0
 """A swinging torque or pivot has at least so many samples a period."""
 MAX_TICKS = 2_000_000
 """Most ticks of a run; a tick takes about 1.5 kB of memory until the recording is written."""
-MAX_STEPS = 1_000_000_000
-"""Most physics steps of a run; so many take hours."""
 _MAX_DENOMINATOR = 10**9  # 1/3 s as a float is the fraction 1/3
 
 
@@ -34,27 +33,6 @@ class TimeGrid(NamedTuple):
     duration_s: float
     timestep_s: float | None
     period_s: float
-
-    def physics_step(self, limit_s: float) -> float:
-        """Fit the physics step of a run.
-
-        Args:
-            limit_s: The largest step that is accurate enough for the plant [s]: see `step_limit.py`.
-
-        Returns:
-            The named step, or the largest within the limit of which a whole number fills the period [s].
-
-        Raises:
-            InputError: The run would have too many steps to come to its end.
-        """
-        step = self.timestep_s or self.period_s / math.ceil(self.period_s / limit_s * (1.0 - 1e-9))
-        steps = self.duration_s / step
-        if steps > MAX_STEPS:
-            raise InputError(
-                f"duration_s = {self.duration_s:g}: {steps:.3g} physics steps of {step:g} s; at most "
-                f"{MAX_STEPS:g} are taken, {MAX_STEPS * step:g} s"
-            )
-        return step
 
 
 class _GridTime(NamedTuple):
@@ -93,10 +71,10 @@ def time_grid(scenario: Scenario) -> TimeGrid:
             f"duration_s = {duration:g}: {duration * control:.3g} control ticks at controller.rate_hz = {control:g}; "
             f"at most {MAX_TICKS} are kept, {MAX_TICKS / control:g} s"
         )
-    grid = TimeGrid(duration, timestep, common_period(scenario) if timestep is None else timestep)
+    times, others = _marked(scenario)
+    grid = TimeGrid(duration, timestep, _common_period(times) if timestep is None else timestep)
     if timestep is not None:
-        grid.physics_step(timestep)
-        for time in _grid_times(scenario):
+        for time in times:
             try:
                 whole_steps(time.seconds, timestep, time.field, time.text)
             except InputError as error:
@@ -104,17 +82,16 @@ def time_grid(scenario: Scenario) -> TimeGrid:
                     raise
                 ratio = time.seconds / timestep
                 steps = sorted({max(1, math.floor(ratio)), max(1, math.ceil(ratio))})
-                times = [1.0 / (n * timestep) if time.unit == "Hz" else n * timestep for n in steps]
-                raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {time.unit}' for t in times)})") from error
-    for field, frequency, mark in marked_values(scenario, Held):
-        if frequency and frequency > control / SWING_SHARE:
+                near = [1.0 / (n * timestep) if time.unit == "Hz" else n * timestep for n in steps]
+                raise InputError(f"{error} (nearest: {' or '.join(f'{t:g} {time.unit}' for t in near)})") from error
+    for field, number, mark in others:
+        if isinstance(mark, Start) and number >= duration:
+            raise InputError(f"{field} = {number:g}: must be less than duration_s = {duration:g}, where the run ends")
+        if isinstance(mark, Held) and number and number > control / SWING_SHARE:
             raise InputError(
-                f"{field} = {frequency:g}: the {mark.what} is held from sample to sample; at most "
+                f"{field} = {number:g}: the {mark.what} is held from sample to sample; at most "
                 f"{control / SWING_SHARE:g} Hz at controller.rate_hz = {control:g}"
             )
-    for field, start, _ in marked_values(scenario, Start):
-        if start >= duration:
-            raise InputError(f"{field} = {start:g}: must be less than duration_s = {duration:g}, where the run ends")
     return grid
 
 
@@ -124,8 +101,12 @@ def common_period(scenario: Scenario) -> float:
     Raises:
         InputError: It is shorter than `MIN_PERIOD_S`; the first field that makes it so is named.
     """
+    return _common_period(_marked(scenario)[0])
+
+
+def _common_period(times: Sequence[_GridTime]) -> float:
     common = Fraction(0)
-    for time in _grid_times(scenario):
+    for time in times:
         a, b = common, time.exact
         divisor = math.gcd(a.numerator * b.denominator, b.numerator * a.denominator)
         common = Fraction(divisor, a.denominator * b.denominator)
@@ -137,12 +118,15 @@ def common_period(scenario: Scenario) -> float:
     return float(common)
 
 
-def _grid_times(scenario: Scenario) -> list[_GridTime]:
-    """Return all periods and times of a scenario and of its axes: rates first, then times."""
-    times = []
+def _marked(scenario: Scenario) -> tuple[list[_GridTime], list[tuple[str, float, Held | Start]]]:
+    """Return all periods and times of a scenario and of its axes, rates first; and what else is marked of itself."""
+    times, others = [], []
     parts = {"": scenario, **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()}}
     for prefix, part in parts.items():
-        for field, number, mark in marked_values(part, OnGrid):
+        for field, number, mark in marked_values(part, (OnGrid, Held, Start)):
+            if not isinstance(mark, OnGrid):
+                others += [] if prefix else [(field, number, mark)]
+                continue
             exact, text = _fraction(number), f"{number:g} {mark.unit}"
             seconds, exact = (1.0 / number, 1 / exact) if mark.unit == "Hz" else (number, exact)
             times.append(_GridTime(prefix + field, text, seconds, exact, mark.unit))
@@ -150,7 +134,7 @@ def _grid_times(scenario: Scenario) -> list[_GridTime]:
         if pair.bandwidth_hz:
             field, period = f"{prefix}sensors.accelerometer.bandwidth_hz", 1.0 / pair.raw_rate_hz
             times.append(_GridTime(field, pair.inside_text, period, _fraction(period)))
-    return sorted(times, key=lambda time: time.unit == "s")
+    return sorted(times, key=lambda time: time.unit == "s"), others
 
 
 def _fraction(number: float) -> Fraction:
