@@ -200,7 +200,7 @@ def figures(scenario: str, settings: dict, options: dict, folder: str) -> dict[s
         experiment = base.with_settings(settings)
     except cmg_mj.InputError:
         experiment = base.with_settings({MOVED.get(field, field): value for field, value in settings.items()})
-    result = experiment.run_many(worlds, vary=vary) if worlds else experiment.run(**options)
+    result = experiment.run_many(worlds, settings=vary) if worlds else experiment.run(**options)
     found: dict[str, object] = {}
     for column, values in result.trajectory.columns.items():
         values = result.trajectory.columns[column]

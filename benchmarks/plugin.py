@@ -22,7 +22,7 @@ from mujoco.batch import Batch
 
 from cmg_mj import Experiment, load_scenario, prepare
 from cmg_mj.features.plugin.driver import initial_states
-from cmg_mj.features.plugin.make import make_plugin, unused_name, write_plugin
+from cmg_mj.features.plugin.make import make_plugin, write_plugin
 from cmg_mj.features.plugin.model import START_KEY
 from cmg_mj.plant.mjcf import parse, quiet
 
@@ -35,7 +35,7 @@ THREADS = os.cpu_count() or 1
 def bench(experiment: Experiment, worlds: int) -> None:
     """Time a scenario's plugin, and print a line for each way of stepping."""
     with tempfile.TemporaryDirectory() as temporary:
-        written = write_plugin(make_plugin(experiment, unused_name()), Path(temporary))
+        written = write_plugin(make_plugin(experiment, f"bench_{experiment.scenario.observer.kind}"), Path(temporary))
         mujoco.mj_loadPluginLibrary(str(written.library))
         models = mujoco.MjModel.from_xml_path(str(written.model)), parse(written.model).compile()
     print(

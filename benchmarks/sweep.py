@@ -38,7 +38,7 @@ def bench(observer: str, worlds: int, *, many_plants: bool) -> None:
     study = SweepStudy(scenario, (parse_axis("plant.equilibrium_bias_deg", "0.5", "plant"),), (observer,), worlds)
     if many_plants:
         axes = tuple(parse_axis(field, values, field) for field, values in PLANTS.items())
-        study = SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, "sample", max(1, worlds // WORLDS_A_PLANT))
+        study = SweepStudy(scenario, axes, (observer,), WORLDS_A_PLANT, max(1, worlds // WORLDS_A_PLANT))
     _, trials = study.chunk(0)
     with clocked() as in_batch:
         start = time.process_time()

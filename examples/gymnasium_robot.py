@@ -9,7 +9,7 @@ from pathlib import Path
 import gymnasium
 
 import cmg_mj
-from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.limits import push_limits
 from cmg_mj.features.mounting.write import write_scenario
 
 ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_pendulum.xml"
@@ -17,7 +17,7 @@ ROBOT = Path(gymnasium.__path__[0]) / "envs" / "mujoco" / "assets" / "inverted_p
 mounted = cmg_mj.mount(ROBOT, body="pole", axis="hinge", release=["slider"])
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")
-    can = prospects(write_scenario(model, ROBOT, "gyro_free"))
+    can = push_limits(write_scenario(model, ROBOT, "gyro_free"))
     experiment = write_scenario(model, ROBOT, "gyro_free", can)
 print(f"falls with {can.limit.pole:.2f} 1/s; any controller recovers at most {can.limit.tilt:.3f} rad")
 for share in (0.6, 1.8):

@@ -22,6 +22,6 @@ print(f"homogeneous beside ltv: {paired_verdict(difference)}, by {difference.mea
 
 biases = [0.0, 0.75, 1.5]
 vary = {"equilibrium_bias_deg": [bias for bias in biases for _ in range(4)]}
-together = cmg_mj.prepare(scenario).run_many(4 * len(biases), vary=vary, keep_trajectory=False)
+together = cmg_mj.prepare(scenario).run_many(4 * len(biases), settings=vary, keep_trajectory=False)
 for bias, group in zip(biases, together.split(len(biases)), strict=True):
     print(f"e = {bias} deg: {group.fell.sum()} of 4 fell, gimbal peak {group.mean('gimbal_peak_deg')} deg")

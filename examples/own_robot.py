@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 
 import cmg_mj
-from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.limits import push_limits
 from cmg_mj.features.mounting.write import write_scenario
 
 LEG = """
@@ -31,7 +31,7 @@ TORSO = f"""
 mounted = cmg_mj.mount(mujoco.MjSpec.from_string(TORSO), body="torso", axis="x", scale=1.3)
 with tempfile.TemporaryDirectory() as folder:
     model = mounted.save(Path(folder) / "balanced.xml")  # plain MuJoCo loads it too
-    can = prospects(write_scenario(model, model, "gyro_free"))
+    can = push_limits(write_scenario(model, model, "gyro_free"))
     experiment = write_scenario(model, model, "gyro_free", can)  # pushes with 0.6 of E
 outcome = experiment.run().outcomes[0]
 print(f"held: {', '.join(mounted.held)}; E is {can.fraction_of_limit:.0%} of what any law could recover from")

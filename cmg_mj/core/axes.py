@@ -17,34 +17,36 @@ class MultiAxisController:
     """Runs a controller an axis, tick after tick.
 
     Args:
-        parts: The controllers, one an axis, of one control period.
-        between: Makes the stage between the axes, from the first part; None for axes that know nothing of each other.
+        controllers: The controllers, one an axis, of one control period.
+        between: Makes the stage between the axes, from the first one; None for axes that know nothing of each other.
 
     Raises:
         InputError: The control periods differ.
     """
 
-    def __init__(self, parts: Sequence[Controller], between: Callable[[Controller], AxesStage] | None = None) -> None:
-        self.parts = tuple(parts)
-        first = self.parts[0]
-        if any(part.period != first.period for part in self.parts):
+    def __init__(
+        self, controllers: Sequence[Controller], between: Callable[[Controller], AxesStage] | None = None
+    ) -> None:
+        self.axes = tuple(controllers)
+        first = self.axes[0]
+        if any(part.period != first.period for part in self.axes):
             raise InputError("controller.rate_hz: must be the same on all axes")
         self.period, self.timestep = first.period, first.timestep
-        self.seed, self.worlds = first.seed, first.worlds
-        self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.parts))
+        self.seed, self.world_ids = first.seed, first.world_ids
+        self.steps_per_sample = math.gcd(*(part.steps_per_sample for part in self.axes))
         """Physics steps between the instants at which anything may be due."""
         self._make_between = between
-        for part in self.parts:
+        for part in self.axes:
             part.turns_gimbals = between is None
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        for part in self.parts:
+        for part in self.axes:
             part.reset()
         self.step: int | None = None
         """The physics step of the last update."""
-        self._between = None if self._make_between is None else self._make_between(self.parts[0])
+        self._between = None if self._make_between is None else self._make_between(self.axes[0])
 
     def update(self, step: int, ideals: MultiAxisReading) -> bool:
         """Take the samples and the control decisions that are due at a physics step.
@@ -69,15 +71,15 @@ class MultiAxisController:
         """Take the samples that are due at a physics step: see `update`."""
         self.step = step
         self._ideals = ideals
-        for part, ideal in zip(self.parts, ideals.axes, strict=True):
+        for part, ideal in zip(self.axes, ideals.axes, strict=True):
             part.sample(step, ideal)
 
     def control(self, step: int) -> None:
         """Take the control decisions of a tick, a multiple of `period`: see `update`."""
-        for part in self.parts:
+        for part in self.axes:
             part.control(step)
         if self._between is not None:
-            self._between(self.parts, self._ideals)
+            self._between(self.axes, self._ideals)
 
 
 ControllerLike = Controller | MultiAxisController

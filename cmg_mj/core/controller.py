@@ -70,7 +70,7 @@ class Controller:
         sensors: The sensors between the ideal readings and the controller, such as `Sensors`.
         plant: The controller's knowledge of the plant.
         seed: Seed of the sensors' noise.
-        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        world_ids: The number of one world, on floats, or the numbers of many, on arrays.
         feedback: Which rate the law uses: the observer's, the gyro's or the true one.
         angle_source: Whether the law uses y1, y2 as (8) says or the estimates, as the text after (10) says.
         open_loop_observers: Observers that run open loop, by name.
@@ -95,7 +95,7 @@ class Controller:
         plant: KnownPlant,
         *,
         seed: int = 0,
-        worlds: int | Sequence[int] = 0,
+        world_ids: int | Sequence[int] = 0,
         feedback: Feedback = "observer",
         angle_source: AngleSource = "measured",
         open_loop_observers: Mapping[str, Observer] | None = None,
@@ -110,14 +110,14 @@ class Controller:
         self.tilt, self.gimbal_angle, self.timestep, self.servos = plant
         self.commands, self.memories = commands, memories
         self.seed = seed
-        self.worlds = worlds
+        self.world_ids = world_ids
         self.axis = axis
         self.turns_gimbals = True
         """True if `update` turns the gimbals; with several axes a stage on all of them may come between."""
         self.feedback: Feedback = feedback
         self.angle_source: AngleSource = angle_source
         self.open_loop_observers = dict(open_loop_observers or {})
-        self._single = isinstance(worlds, int)
+        self._single = isinstance(world_ids, int)
         self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         self._law = LawRunner(law, self._single)
         observers = [observer, *self.open_loop_observers.values()]
@@ -126,13 +126,13 @@ class Controller:
         self.reset()
 
     @property
-    def parts(self) -> Sequence[Controller]:
+    def axes(self) -> Sequence[Controller]:
         """Controllers of the axes; for one axis, the controller itself."""
         return (self,)
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.worlds, self.axis)
+        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.world_ids, self.axis)
         self.tick: Tick | None = None
         self.gimbal_rate: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the servo's stages [rad/s]."""

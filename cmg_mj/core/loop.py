@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -50,12 +50,9 @@ def instants(end: int, grid: int, edges: Iterable[int] = ()) -> Iterator[tuple[i
     Yields:
         The step, and the steps until the next instant.
     """
-    beside = sorted({end, *(step for step in edges if step < end)})
-    start = 0
-    for stop in heapq.merge(range(0, end, grid), beside):
-        if stop > start:
-            yield start, stop - start
-            start = stop
+    beside = [end, *(step for step in edges if step < end)]
+    for start, stop in pairwise(np.union1d(np.arange(0, end, grid), beside).astype(int).tolist()):
+        yield start, stop - start
 
 
 Joints = Sequence[Scalar] | np.ndarray
@@ -192,7 +189,7 @@ class ControlLoop:
         self._end, self._disturbances = end, disturbances
         self._fall_angle = fall_angle
         self._steps = 0
-        self._parts = list(enumerate(controller.parts))
+        self._parts = list(enumerate(controller.axes))
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""

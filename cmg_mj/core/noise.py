@@ -39,12 +39,12 @@ class NoiseStream(IntEnum):
         return self + STREAMS_PER_AXIS * axis
 
 
-def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
+def normals(seed: int, world_ids: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
     """Standard normal numbers, sample after sample, that depend on (seed, world, stream) alone.
 
     Args:
         seed: The run's seed.
-        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        world_ids: The number of one world, on floats, or the numbers of many, on arrays.
         stream: `NoiseStream.on_axis` of the sensor and its axis.
         channels: Numbers a sample.
 
@@ -52,8 +52,8 @@ def normals(seed: int, worlds: int | Sequence[int], stream: int, channels: int) 
         One sample: `channels` floats, or an array (channels, n_worlds).
     """
     block = 256  # drawing one by one costs more than the rest of a sensor
-    single = isinstance(worlds, int)
-    different, places = np.unique([worlds] if single else worlds, return_inverse=True)
+    single = isinstance(world_ids, int)
+    different, places = np.unique([world_ids] if single else world_ids, return_inverse=True)
     alone = np.array_equal(places, range(len(places)))  # every world once, in order
     generators = [
         np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different

@@ -139,7 +139,9 @@ class SampledSensor:
             for _ in range(self._settle + 1):
                 self._delivered = self._measure(ideal)
         elif step % self._raw == 0:
-            signal = self._measure(ideal)
+            signal = ideal[self._signal]
+            for stage in self._stages:  # as `_measure`, at every tick
+                signal = stage(signal, ideal)
             if step % self.period == 0:
                 if self._latency:
                     self._on_the_way.append((step + self._latency, signal))

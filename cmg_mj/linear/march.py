@@ -64,7 +64,7 @@ def march(design: Design, plant: LinearPlant) -> Motion:
     worlds = len(STARTS_RAD_S) + 1  # one for each small start, and the scenario's own as the last
     known = KnownPlant(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
     controller = design.controller(
-        known, worlds=range(worlds), sensors=_quiet(scenario.sensors), open_loop_observers={}
+        known, world_ids=range(worlds), sensors=_quiet(scenario.sensors), open_loop_observers={}
     )
     interval = controller.steps_per_sample * rig.timestep
     F, G = plant.hold(interval)

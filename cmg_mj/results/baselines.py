@@ -140,7 +140,7 @@ class Baselines:
         gyro: The gyro.
         dt: Control period [s].
         seed: Seed of the sensors' noise.
-        worlds: The number of one world, or the numbers of many: the gyro's noise depends on (seed, number) alone.
+        world_ids: The number of one world, or the numbers of many: the gyro's noise depends on (seed, number) alone.
         tilt_sigmas: Standard deviation of y1 at a tick in each world [rad].
         axis: The number of the axis: each has a gyro of its own.
     """
@@ -150,12 +150,12 @@ class Baselines:
         gyro: MemsGyro,
         dt: float,
         seed: int,
-        worlds: int | Sequence[int],
+        world_ids: int | Sequence[int],
         tilt_sigmas: Sequence[float],
         axis: int = 0,
     ) -> None:
-        noise = normals(seed, worlds, NoiseStream.MEMS_GYRO.on_axis(axis), gyro.channels)
-        part = np.array(next(normals(seed, worlds, NoiseStream.MEMS_PART.on_axis(axis), 2))).reshape(2, -1)
+        noise = normals(seed, world_ids, NoiseStream.MEMS_GYRO.on_axis(axis), gyro.channels)
+        part = np.array(next(normals(seed, world_ids, NoiseStream.MEMS_PART.on_axis(axis), 2))).reshape(2, -1)
         self._read = gyro.make_both(dt, noise, part)
         self._fused = FusedGyro(gyro.white_noise_sigma(dt), gyro.flicker_floor, tilt_sigmas, dt)
 

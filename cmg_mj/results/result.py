@@ -55,7 +55,7 @@ class Result(NamedColumns):
         trajectory: All ticks, if they were kept.
         observers: The observer in the loop, then the open-loop observers.
         seed: Seed of the sensors' noise.
-        worlds: The worlds' numbers, (n_worlds,).
+        world_ids: The worlds' numbers, (n_worlds,).
         driver: Who called the controller, or was it.
     """
 
@@ -64,7 +64,7 @@ class Result(NamedColumns):
     trajectory: Trajectory | None = None
     observers: Sequence[str] = ("",)
     seed: int = 0
-    worlds: Sequence[int] = ()
+    world_ids: Sequence[int] = ()
     driver: str = "native"
 
     @property
@@ -133,7 +133,7 @@ class Result(NamedColumns):
             A row a world, by column.
         """
         loop = self.observers[0]
-        worlds = self.worlds or range(len(self.outcomes))
+        worlds = self.world_ids or range(len(self.outcomes))
         return [
             {
                 "observer": estimator or loop,
@@ -202,5 +202,5 @@ class Result(NamedColumns):
             outcomes=self.outcomes[worlds],
             summaries=self.summaries[worlds],
             trajectory=None if self.trajectory is None else self.trajectory.of_worlds(worlds),
-            worlds=self.worlds[worlds],
+            world_ids=self.world_ids[worlds],
         )

@@ -66,7 +66,7 @@ def _tick(plant: Plant, controller: ControllerLike, data: mujoco.MjData, sense: 
 
 def _hold(plant: Plant, controller: ControllerLike, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
-    for axis, part in zip(plant.axes, controller.parts, strict=True):
+    for axis, part in zip(plant.axes, controller.axes, strict=True):
         if part.gimbal_rate is not None:
             for module in axis.modules:
                 data.ctrl[module.servo] = module.direction * part.gimbal_rate

@@ -23,7 +23,7 @@ def outsides(scenario: Scenario) -> Outsides:
 
 
 def disturbances(
-    settings: Outsides, plants: Sequence[Plant], seed: int, worlds: int | Sequence[int]
+    settings: Outsides, plants: Sequence[Plant], seed: int, world_ids: int | Sequence[int]
 ) -> list[Disturbance]:
     """Make what acts from outside.
 
@@ -31,7 +31,7 @@ def disturbances(
         settings: The settings; what is missing does not act.
         plants: The plant of each world.
         seed: The run's seed.
-        worlds: The number of one world, or the numbers of many.
+        world_ids: The number of one world, or the numbers of many.
     """
     first = plants[0]
     made: list[Disturbance] = [
@@ -39,5 +39,5 @@ def disturbances(
     ]
     for name, make in entries("disturbance").items():
         if settings.get(name):
-            made.append(make(settings[name], plants, seed, worlds))
+            made.append(make(settings[name], plants, seed, world_ids))
     return made

@@ -59,13 +59,13 @@ class Experiment:
         scenario: What it was made from.
         plant: The rig.
         design: The law and the observers; of several axes the first one's.
-        axes: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
+        several: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
     """
 
     scenario: Scenario
     plant: Plant
     design: Design
-    axes: tuple[Experiment, ...] = ()
+    several: tuple[Experiment, ...] = ()
 
     @property
     def law(self) -> Law:
@@ -75,40 +75,43 @@ class Experiment:
     @property
     def observer_title(self) -> str:
         """The observer in the loop; of several axes with observers of their own, each with its axis."""
-        kinds = [part.scenario.observer.kind for part in self.parts]
+        kinds = [part.scenario.observer.kind for part in self.axes]
         if len(set(kinds)) == 1:
             return kinds[0]
-        return ", ".join(f"{part.plant.axis.name} {kind}" for part, kind in zip(self.parts, kinds, strict=True))
+        return ", ".join(f"{part.plant.axis.name} {kind}" for part, kind in zip(self.axes, kinds, strict=True))
 
     @property
     def observer_names(self) -> list[str]:
         """The observer in the loop, then the open-loop observers; of several axes the first one's."""
-        first = self.parts[0].scenario
+        first = self.axes[0].scenario
         return [first.observer.kind, *first.open_loop_names()]
 
-    def controller(self, worlds: int | Sequence[int] = 0) -> ControllerLike:
+    def controller(self, world_ids: int | Sequence[int] = 0) -> ControllerLike:
         """Make a fresh controller.
 
         Args:
-            worlds: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
+            world_ids: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
 
         Returns:
             The controller; of several axes a `MultiAxisController`.
         """
         return self.join_axes(
-            [part.design.controller(part.plant.interface, worlds=worlds, axis=i) for i, part in enumerate(self.parts)]
+            [
+                part.design.controller(part.plant.interface, world_ids=world_ids, axis=i)
+                for i, part in enumerate(self.axes)
+            ]
         )
 
     def axis_controller(
         self,
-        worlds: int | Sequence[int] = 0,
+        world_ids: int | Sequence[int] = 0,
         observer: Observer | None = None,
         make: Callable[..., Controller] = Controller,
     ) -> Controller:
         """Make a fresh controller of the only axis.
 
         Args:
-            worlds: The number of one world, or the numbers of many.
+            world_ids: The number of one world, or the numbers of many.
             observer: Instead of the scenario's.
             make: Makes a controller of another kind: see `make_controller`.
 
@@ -119,7 +122,7 @@ class Experiment:
             InputError: The plant has several axes.
         """
         part = self.require_single_axis("one controller")
-        return part.design.controller(part.plant.interface, worlds=worlds, observer=observer, make=make)
+        return part.design.controller(part.plant.interface, world_ids=world_ids, observer=observer, make=make)
 
     def join_axes(self, controllers: Sequence[Controller]) -> ControllerLike:
         """Join the controllers of the axes; of one axis its controller itself."""
@@ -156,7 +159,7 @@ class Experiment:
         self,
         worlds: int | Sequence[int],
         plants: Sequence[Plant] | None = None,
-        vary: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
+        settings: Mapping[str, Sequence[Any] | np.ndarray] | None = None,
         **options: Unpack[SimulationOptions],
     ) -> Result:
         """Run many worlds at once.
@@ -164,8 +167,8 @@ class Experiment:
         Args:
             worlds: How many, or their numbers: world i has the same noise wherever it stands.
             plants: A plant a world, if they differ.
-            vary: The same by settings: a field -> its value in each world, such as {"equilibrium_bias_deg": [0.0, 0.5],
-                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of one batch may differ in: see `batch.py`.
+            settings: The same by settings: a field -> its value in each world, such as {"push.0.torque_n_m": [1.0, 2.0],
+                "equilibrium_bias_deg": [0.0, 0.5]}. Only numbers that worlds of one batch may differ in: see `batch.py`.
             **options: Those of `simulate`.
 
         Returns:
@@ -175,28 +178,28 @@ class Experiment:
             InputError: There is no world, or the plants do not fit the worlds or each other.
         """
         numbers = [int(number) for number in (range(worlds) if isinstance(worlds, int) else worlds)]
-        if vary is not None and plants is not None:
-            raise InputError("run_many: give plants or vary, not both")
-        experiments = [self] * len(numbers) if vary is None else self.with_varied(vary)
+        if settings is not None and plants is not None:
+            raise InputError("run_many: give plants or settings, not both")
+        experiments = [self] * len(numbers) if settings is None else self.with_varied(settings)
         return run_batch(experiments, numbers, plants, **options)
 
     @functools.cached_property
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
-        prefixes = [f"axes.{axis.plant.axis.name}." for axis in self.axes] or [""]
-        of_axes = [key_parts(part.scenario, part.design, name) for part, name in zip(self.parts, prefixes, strict=True)]
+        prefixes = [f"axes.{axis.plant.axis.name}." for axis in self.several] or [""]
+        of_axes = [key_parts(part.scenario, part.design, name) for part, name in zip(self.axes, prefixes, strict=True)]
         return ("the plant's structure", False, plant_structure(self.plant)), *itertools.chain(*of_axes)
 
     @property
-    def parts(self) -> tuple[Experiment, ...]:
+    def axes(self) -> tuple[Experiment, ...]:
         """One an axis."""
-        return self.axes or (self,)
+        return self.several or (self,)
 
-    def with_varied(self, vary: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
+    def with_varied(self, settings: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """Return the scenario with other settings in each world; worlds with equal settings share one.
 
         Args:
-            vary: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
+            settings: Field -> its value in each world. A field is named as with `--set`; one of [plant] by itself too.
 
         Returns:
             An experiment a world.
@@ -204,15 +207,15 @@ class Experiment:
         Raises:
             InputError: There is no such field, a value is not allowed, or the lists differ in length.
         """
-        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in vary.values()]
+        lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in settings.values()]
         are_lists = all(isinstance(values, Sequence) and not isinstance(values, str) for values in lists)
         if not are_lists or len({len(values) for values in lists}) != 1:
             raise InputError(
-                f"vary: {', '.join(vary)}: must be lists of values by field, as many values each, one a world, such as "
-                '{"equilibrium_bias_deg": [0.0, 0.5]}'
+                f"settings: {', '.join(settings)}: must be lists of values by field, as many values each, one a world, "
+                'such as {"equilibrium_bias_deg": [0.0, 0.5]}'
             )
         of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
-        names = [f"plant.{name}" if name in of_plant else name for name in vary]
+        names = [f"plant.{name}" if name in of_plant else name for name in settings]
         rows = [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
         experiments = {key: self.with_settings(row) for key, row in {repr(row): row for row in rows}.items()}
         return [experiments[repr(row)] for row in rows]
@@ -231,7 +234,7 @@ class Experiment:
         """
         fields = self.scenario.as_fields()
         for name, value in values.items():
-            assign(fields, name, value, f"vary: {name!r}")
+            assign(fields, name, value, f"settings: {name!r}")
         settings = ", ".join(f"{name}={value}" for name, value in values.items())
         return prepare(parse_scenario(fields, f"{self.scenario.source} with {settings}".strip()), like=self.plant)
 
@@ -267,7 +270,7 @@ class Experiment:
             raise InputError(f"driver = {driver!r}: drives one world, not a batch")
         settings, keep = self.scenario.metrics, options.get("keep_trajectory", True)
         outside = outsides(self.scenario) if outside is None else outside
-        acting = disturbances(outside, plants, controller.seed, controller.worlds)
+        acting = disturbances(outside, plants, controller.seed, controller.world_ids)
         if single and any(one.accelerates for one in acting):
             plants = [plants[0].with_own_model()]
         timestep, duration_s = plants[0].timestep, self.scenario.duration_s
@@ -280,9 +283,9 @@ class Experiment:
                 outside,
                 settings,
                 keep=keep,
-                joints=axis is self.parts[0],
+                joints=axis is self.axes[0],
             )
-            for name, axis, part in zip(plants[0].axis_names, self.parts, controller.parts, strict=True)
+            for name, axis, part in zip(plants[0].axis_names, self.axes, controller.axes, strict=True)
         }
 
         def since(tick: int) -> Trajectory:
@@ -326,7 +329,7 @@ class Experiment:
             since(0) if keep else None,
             tuple(self.observer_names),
             controller.seed,
-            (controller.worlds,) if isinstance(controller.worlds, int) else tuple(controller.worlds),
+            (controller.world_ids,) if isinstance(controller.world_ids, int) else tuple(controller.world_ids),
             driver,
         )
 
@@ -342,13 +345,13 @@ class Experiment:
         Raises:
             InputError: The rig has several.
         """
-        if len(self.axes) > 1:
+        if len(self.several) > 1:
             names = self.plant.axis_names
             raise InputError(
                 f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
                 f'others, as with --set plant.locked_axes=["{names[-1]}"]'
             )
-        return self.parts[0]
+        return self.axes[0]
 
     def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
         """Make the closed loop, with the observer in it, a linear system for python-control.
@@ -401,14 +404,14 @@ class Experiment:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
         from cmg_mj.linear.verdict import hints  # as above
 
-        if not self.axes:
+        if not self.several:
             judgements = [judge(self.design, self.plant) for judge in entries("judge").values()]
             return [*hints(self.design, self.plant), *(hint for judged in judgements for hint in judged.hints)]
-        return [f"{part.plant.axis.name}: {hint}" for part in self.axes for hint in part.hints]
+        return [f"{part.plant.axis.name}: {hint}" for part in self.several for hint in part.hints]
 
     def resolved(self) -> dict[str, Any]:
         """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
-        return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.parts})
+        return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.axes})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
@@ -483,7 +486,7 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
 
 def run_batch(
     experiments: Sequence[Experiment],
-    worlds: Sequence[int],
+    world_ids: Sequence[int],
     plants: Sequence[Plant] | None = None,
     observer: Observer | None = None,
     **options: Unpack[SimulationOptions],
@@ -492,7 +495,7 @@ def run_batch(
 
     Args:
         experiments: One a world.
-        worlds: The worlds' numbers: world i has the same noise in every experiment.
+        world_ids: The worlds' numbers: world i has the same noise in every experiment.
         plants: A plant a world, instead of the experiments'.
         observer: The observer of all worlds instead of the first experiment's; then it is not looked whether they fit.
         **options: Options of `simulate`.
@@ -504,9 +507,9 @@ def run_batch(
         InputError: They differ in something that worlds of one batch have in common.
     """
     plants = [experiment.plant for experiment in experiments] if plants is None else list(plants)
-    if not plants or len(plants) != len(worlds):
+    if not plants or len(plants) != len(world_ids):
         raise InputError(
-            f"run_many: {len(worlds)} worlds and {len(plants)} plants; give at least one, and as many of each"
+            f"run_many: {len(world_ids)} worlds and {len(plants)} plants; give at least one, and as many of each"
         )
     if len({plant_structure(plant) for plant in {*plants, *(experiment.plant for experiment in experiments)}}) > 1:
         raise InputError(
@@ -522,15 +525,15 @@ def run_batch(
                 "each value"
             )
     controllers, outside = [], outsides(first.scenario)
-    for i, part in enumerate(first.parts):
-        parts = [experiment.parts[i] for experiment in experiments]
+    for i, part in enumerate(first.axes):
+        parts = [experiment.axes[i] for experiment in experiments]
         law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
         tilt = stack_worlds([plant.axes[i].radial_tilt for plant in plants])
         servos = backlash(stack_worlds([plant.backlash for plant in plants]))
         controllers.append(
             part.design.controller(
                 part.plant.interface._replace(tilt=tilt, servos=servos),
-                worlds=worlds,
+                world_ids=world_ids,
                 axis=i,
                 observer=observer,
                 open_loop_observers=batched_open_loop_observers([one.design for one in parts]),

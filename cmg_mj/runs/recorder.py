@@ -54,7 +54,7 @@ class TickRecorder:
         self._layout = Layout(tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds)
         dt, sensors = controller.law.dt, controller.sensors
         self._keep, self._joints, self._dt = keep, joints, dt
-        self._single = isinstance(controller.worlds, int)
+        self._single = isinstance(controller.world_ids, int)
         self._waiting: list[tuple] = []
         self._kept = {name: [np.zeros((0, len(plants)))] for name in self._layout.columns()}
         pairs = [(plant, world_value(sensors, world)) for world, plant in enumerate(plants)]
@@ -80,7 +80,9 @@ class TickRecorder:
         )
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
-        self._references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.worlds, sigmas, controller.axis)
+        self._references = Baselines(
+            sensors.mems_gyro, dt, controller.seed, controller.world_ids, sigmas, controller.axis
+        )
 
     def add(self, q: Joints, v: Joints, torque: Scalar, running: np.ndarray | None) -> None:
         """Take the controller's latest tick.

@@ -60,7 +60,7 @@ def report_run(experiment: Experiment, result: Result, *, several: bool = False)
 
     assert result.trajectory is not None
     scenario, outcome = experiment.scenario, result.outcomes[0]
-    world = result.worlds[0] if result.worlds else 0
+    world = result.world_ids[0] if result.world_ids else 0
     origin: Summary = {"driver": result.driver} if result.driver == "board" else {}
     if world:
         origin["world"] = world

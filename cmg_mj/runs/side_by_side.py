@@ -22,11 +22,11 @@ class BatchJob(NamedTuple):
 
     Attributes:
         experiments: One a world, all with the same observer.
-        worlds: Their numbers.
+        world_ids: Their numbers.
     """
 
     experiments: Sequence[Experiment]
-    worlds: Sequence[int]
+    world_ids: Sequence[int]
 
 
 def run_of(experiment: Experiment, worlds: int) -> BatchJob:
@@ -65,7 +65,7 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
     for indices in alike.values():
         batch: list[int] = []
         for i in indices:
-            if batch and sum(len(jobs[j].worlds) for j in [*batch, i]) > MAX_WORLDS:
+            if batch and sum(len(jobs[j].world_ids) for j in [*batch, i]) > MAX_WORLDS:
                 yield batch
                 batch = []
             batch.append(i)
@@ -87,11 +87,11 @@ def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[
     # Neighbours with the same observer, with the same noise, are one part.
     for _, group in groupby(jobs, key=lambda job: job.experiments[0].batch_key):
         alike = list(group)
-        parts.append((alike[0].experiments[0].design.observer(), sum(len(job.worlds) for job in alike)))
+        parts.append((alike[0].experiments[0].design.observer(), sum(len(job.world_ids) for job in alike)))
     experiments = [experiment for job in jobs for experiment in job.experiments]
-    numbers = [int(number) for job in jobs for number in job.worlds]
+    numbers = [int(number) for job in jobs for number in job.world_ids]
     whole = run_batch(experiments, numbers, observer=BatchedObservers(parts), **options)
-    places = neighbours([len(job.worlds) for job in jobs])
+    places = neighbours([len(job.world_ids) for job in jobs])
     return [
         _renamed(whole.select(place), job.experiments[0].scenario.observer.kind)
         for job, place in zip(jobs, places, strict=True)

@@ -59,7 +59,7 @@ class Design:
         self,
         plant: KnownPlant,
         *,
-        worlds: int | Sequence[int] = 0,
+        world_ids: int | Sequence[int] = 0,
         axis: int = 0,
         make: Callable[..., Controller] = Controller,
         observer: Observer | None = None,
@@ -71,7 +71,7 @@ class Design:
 
         Args:
             plant: The controller's knowledge of the plant.
-            worlds: The number of one world, or the numbers of many.
+            world_ids: The number of one world, or the numbers of many.
             axis: The number of the plant's axis.
             make: See `make_controller`.
             observer: Instead of the scenario's, as are the next three.
@@ -93,7 +93,7 @@ class Design:
             plant,
             make,
             seed=self.scenario.seed,
-            worlds=worlds,
+            world_ids=world_ids,
             feedback=settings.feedback,
             angle_source=settings.angle_source,
             bias_trim_s=settings.bias_trim_s,
@@ -184,7 +184,7 @@ class StageOptions(TypedDict, total=False):
     """Keyword arguments of `Controller` that are a user's choice, and settings of its stages."""
 
     seed: int
-    worlds: int | Sequence[int]
+    world_ids: int | Sequence[int]
     feedback: Feedback
     angle_source: AngleSource
     open_loop_observers: Mapping[str, Observer] | None

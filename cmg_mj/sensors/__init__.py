@@ -35,13 +35,13 @@ class Sensors:
         """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
         return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
 
-    def at_work(self, timestep: float, seed: int, worlds: int | Sequence[int], axis: int = 0) -> list[SampledSensor]:
+    def at_work(self, timestep: float, seed: int, world_ids: int | Sequence[int], axis: int = 0) -> list[SampledSensor]:
         """Start the sensors that the controller reads: the accelerometers, the encoders, the fibre-optic gyro.
 
         Args:
             timestep: Physics step [s].
             seed: The run's seed.
-            worlds: The number of one world, on floats, or the numbers of many, on arrays.
+            world_ids: The number of one world, on floats, or the numbers of many, on arrays.
             axis: The number of the axis whose they are: each has noise of its own.
 
         Returns:
@@ -55,7 +55,7 @@ class Sensors:
                 Site(
                     f"sensors.{name}",
                     timestep,
-                    lambda stream, channels: normals(seed, worlds, stream.on_axis(axis), channels),
+                    lambda stream, channels: normals(seed, world_ids, stream.on_axis(axis), channels),
                 )
             )
             for name in ("accelerometer", "encoder", "fog")

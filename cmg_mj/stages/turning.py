@@ -63,23 +63,23 @@ class Turning:
 
     def __init__(self, coupling: YawCoupling, gyro: Any, first: Controller) -> None:
         self._coupling = [coefficients.tolist() for coefficients in coupling]
-        noise = normals(first.seed, first.worlds, NoiseStream.TURN_GYRO, gyro.channels)
+        noise = normals(first.seed, first.world_ids, NoiseStream.TURN_GYRO, gyro.channels)
         self._read = gyro.make_reading_function(first.law.dt, noise)
 
-    def __call__(self, parts: Sequence[Controller], ideals: MultiAxisReading) -> None:
+    def __call__(self, controllers: Sequence[Controller], ideals: MultiAxisReading) -> None:
         """Add to each axis' command what cancels the torque of momenta that are swept round."""
         flywheels, inertia, coriolis = self._coupling
         turn_rate = ideals.turn_rate
         read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
         w = float(read[0]) if type(turn_rate) is float else read
-        ticks = [part.tick for part in parts if part.tick is not None]
+        ticks = [part.tick for part in controllers if part.tick is not None]
         turned = [sin(tick.y2) for tick in ticks]
-        known = zip(parts, ticks, ideals.axes, strict=True)
+        known = zip(controllers, ticks, ideals.axes, strict=True)
         rates = [
             {"observer": tick.estimates[0][1], "fog": tick.fog, "truth": ideal.rate}[part.feedback]
             for part, tick, ideal in known
         ]
-        for part, tick, c, d, k in zip(parts, ticks, flywheels, inertia, coriolis, strict=True):
+        for part, tick, c, d, k in zip(controllers, ticks, flywheels, inertia, coriolis, strict=True):
             added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
             limit = part.law.rate_limit
             total = clip(tick.u + added, -limit, limit)

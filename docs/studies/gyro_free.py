@@ -70,7 +70,7 @@ def cells(
     numbers = list(range(worlds)) * len(biases)
     return (
         experiment(observer, noise, *more, seed=seed)
-        .run_many(numbers, vary=vary, keep_trajectory=False)
+        .run_many(numbers, settings=vary, keep_trajectory=False)
         .split(len(biases))
     )
 
@@ -212,7 +212,7 @@ def limits(noises: Sequence[float]) -> None:
 
     def falls(of: Experiment, sign: float, steps: int) -> bool:
         vary = {"equilibrium_bias_deg": [sign * steps * STEP_DEG] * 20}
-        return int(of.run_many(20, vary=vary, keep_trajectory=False).fell.sum()) >= 10
+        return int(of.run_many(20, settings=vary, keep_trajectory=False).fell.sum()) >= 10
 
     rows = []
     cases = [(f"`{name}`", name, ()) for name in (*NEW, "adaptive", "high_gain", "linear")]

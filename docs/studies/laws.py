@@ -70,7 +70,7 @@ def borne_pushes(case: Case) -> np.ndarray:
     experiment = prepare(load_scenario("push_recovery", [f"seed={SEED}", *case.overrides], case.observer))
     numbers = np.repeat(np.arange(WORLDS), len(PUSHES)).tolist()
     vary = {"push.0.torque_n_m": np.tile(PUSHES, WORLDS)}
-    stands = experiment.run_many(numbers, vary=vary, keep_trajectory=False).stood.reshape(WORLDS, -1)
+    stands = experiment.run_many(numbers, settings=vary, keep_trajectory=False).stood.reshape(WORLDS, -1)
     count = np.where(stands.all(axis=1), len(PUSHES), np.argmin(stands, axis=1))
     return np.concatenate([[0.0], PUSHES])[count]
 

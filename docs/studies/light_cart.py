@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.limits import Prospects, prospects
+from cmg_mj.features.mounting.limits import PushLimits, push_limits
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -48,17 +48,17 @@ LOOPS += [(PIVOT, name, "estimated") for name in ("gyro_free", "free_pivot", "ka
 RUBBED = [loop for loop in LOOPS if loop[0] == CENTRE]
 
 
-def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[Experiment, Prospects]:
+def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[Experiment, PushLimits]:
     """The cart-pole with a pair, and its limits."""
     with tempfile.TemporaryDirectory() as folder:
         spec = mujoco.MjSpec.from_string(cart_pole(mass, friction, damping))
         model = mount(spec, "pole", axis="hinge", release=["slider"]).save(Path(folder) / "cart.xml")
         experiment = write_scenario(model, model, "gyro_free")
-    return experiment, prospects(experiment, with_margin=False)
+    return experiment, push_limits(experiment, with_margin=False)
 
 
 def standing(
-    experiment: Experiment, limits: Prospects, loop: tuple[str, str, str], worlds: int = WORLDS, off: float = 0.0
+    experiment: Experiment, limits: PushLimits, loop: tuple[str, str, str], worlds: int = WORLDS, off: float = 0.0
 ) -> str:
     """Count the worlds that stand, in a cell's words, if the tilt is taken about a point so much too high [m]."""
     about, name, angle_source = loop
@@ -82,7 +82,7 @@ def standing(
     return str(int(loop_experiment.run_many(worlds, keep_trajectory=False).stood.sum()))
 
 
-def figures(experiment: Experiment, limits: Prospects) -> list[str]:
+def figures(experiment: Experiment, limits: PushLimits) -> list[str]:
     """Inertia, pole, ceiling and y1 by the reduced model; the loop's poles with the true rate, linearised."""
     plant, poles = experiment.plant, limits.sliding_poles
     assert poles is not None

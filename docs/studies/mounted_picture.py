@@ -17,7 +17,7 @@ mpl.use("agg")
 import matplotlib.pyplot as plt
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.limits import push_limits
 from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
 from cmg_mj.view.plots.style import colour, hexadecimal
 
@@ -64,7 +64,7 @@ def main() -> None:
     made = mount(ROBOT, "torso", axis="x", scale=1.21)
     with tempfile.TemporaryDirectory() as folder:
         model = made.save(Path(folder) / "balanced.xml")
-        can = prospects(write_scenario(model, ROBOT, "gyro_free"))
+        can = push_limits(write_scenario(model, ROBOT, "gyro_free"))
         run = write_scenario(model, ROBOT, "gyro_free", can).run().trajectory
     assert run is not None
     time = run["time_s"]

@@ -20,7 +20,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
-from cmg_mj.features.mounting.limits import PUSH_S, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, push_limits
 from cmg_mj.features.mounting.push import TimeLimit, simulated_push
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.tables import markdown_table
@@ -57,14 +57,14 @@ def stood(experiment: Experiment, torques: list[float]) -> int:
     """In how many worlds it stands, each with its push [N m]."""
     numbers = [i % WORLDS for i in range(len(torques))]
     vary = {"push.0.torque_n_m": torques}
-    return int(experiment.run_many(numbers, vary=vary, keep_trajectory=False).stood.sum())
+    return int(experiment.run_many(numbers, settings=vary, keep_trajectory=False).stood.sum())
 
 
 def row(name: str, robot: Robot, folder: Path) -> list[str]:
     """All of one robot."""
     model = mount(robot.path, **robot.options).save(folder / "balanced.xml")
     upright = write_scenario(model, robot.path, "gyro_free")
-    can = prospects(upright)
+    can = push_limits(upright)
     stands = simulated_push(upright, can, time_limit=TimeLimit(math.inf)).impulse
     other = write_scenario(model, robot.path, "gyro_free", can).with_settings({"seed": SEED, "duration_s": 30.0})
     alone = stood(other, [0.0] * WORLDS)
@@ -92,7 +92,7 @@ def beside_homogeneous(name: str, robot: Robot, folder: Path) -> list[str]:
     mounted = write_scenario(model, robot.path, "gyro_free")
     kinds = [ObserverSettings(kind=kind) for kind in ("homogeneous", "gyro_free")]  # with the papers' parameters
     loops = [prepare(mounted.scenario.model_copy(update={"observer": kind}), mounted.plant) for kind in kinds]
-    limits = [prospects(loop) for loop in loops]
+    limits = [push_limits(loop) for loop in loops]
     push = limits[0].push_margin.median_impulse / PUSH_S
     upright = {"seed": SEED, "duration_s": 14.0, "plant.initial_tilt_deg": 0.0}
     upright["push"] = [{"start_s": 2.0, "duration_s": PUSH_S, "torque_n_m": push}]

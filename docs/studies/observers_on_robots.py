@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from cmg_mj import mount
 from cmg_mj.core.reduced_model import hold_matrices
-from cmg_mj.features.mounting.limits import prospects, push_margin
+from cmg_mj.features.mounting.limits import push_limits, push_margin
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.tuning import Recorded, halves, recorder, tune
 from cmg_mj.features.tuning.simulations import window_of
@@ -79,11 +79,12 @@ def model_floor(experiment: Experiment, window_s: float) -> float:
 def floors(experiment: Experiment, held: Recorded) -> dict[str, float]:
     """Fits that the floors leave, from the push on."""
     trajectory, dt = held.trajectory, experiment.law.dt
+    worlds = len(held.zero_errors)
     start, end = window_of(experiment.scenario)
-    pushed = np.repeat((trajectory["time_s"] >= start - 1e-9)[:, None], held.worlds, axis=1)
-    tilt = TiltFloor(dt, held.worlds)
+    pushed = np.repeat((trajectory["time_s"] >= start - 1e-9)[:, None], worlds, axis=1)
+    tilt = TiltFloor(dt, worlds)
     tilt.add(trajectory["y1_rad"], trajectory["x2_rad_s"], np.ones_like(pushed), pushed)
-    y1 = [tilt.errors(world)[1] or math.nan for world in range(len(held.zero_errors))]
+    y1 = [tilt.errors(world)[1] or math.nan for world in range(worlds)]
     noise = experiment.design.constructor_arguments[2]
     errors = float(np.mean(y1)), model_floor(experiment, end - start), acceleration_floor(noise, dt)
     return {name: 1.0 - error / held.zero_rms for name, error in zip(FLOORS, errors, strict=True)}
@@ -161,7 +162,7 @@ class OnRobot:
     def __init__(self, robot: str, folder: Path) -> None:
         path = ROBOTS[robot].path
         model = mount(path, **ROBOTS[robot].options).save(folder / "balanced.xml")
-        limits = prospects(write_scenario(model, path, "gyro_free"))
+        limits = push_limits(write_scenario(model, path, "gyro_free"))
         self.ceiling = limits.limit_push_impulse
         self.experiment = write_scenario(model, path, "gyro_free", limits)
 

@@ -49,7 +49,7 @@ def errors(parameters: dict) -> tuple[float, float, float, int]:
     for pushes in (pushed.push, []):
         observer = ObserverSettings(kind="adaptive", **parameters)
         experiment = prepare(pushed.model_copy(update={"observer": observer, "push": pushes}))
-        result = experiment.run_many(len(biases_deg), vary={"equilibrium_bias_deg": biases_deg})
+        result = experiment.run_many(len(biases_deg), settings={"equilibrium_bias_deg": biases_deg})
         fell += int((~result.stood).sum())
         recorded = result.trajectory
         assert recorded is not None

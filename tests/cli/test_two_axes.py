@@ -214,4 +214,4 @@ def test_in_a_loop_of_ones_own() -> None:
         control(rig, made, data)
         mujoco.mj_step(rig.model, data)
     assert abs(rig.largest_tilt(data.qpos)) < 0.03
-    assert len(made.parts) == 2
+    assert len(made.axes) == 2

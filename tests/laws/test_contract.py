@@ -115,7 +115,7 @@ def test_worlds_of_other_limits_share_a_batch(kind: str) -> None:
     settings = ["plant.initial_tilt_deg=6.0", f"controller.kind={kind}"]
     limits = [3.0, 2.0, 1.5]
     vary = {"controller.rate_limit_rad_s": limits}
-    many = recorded(push_recovery(*SHORT, *settings).run_many(3, vary=vary))
+    many = recorded(push_recovery(*SHORT, *settings).run_many(3, settings=vary))
     for i, limit in enumerate(limits):
         one = recorded(push_recovery(*SHORT, *settings, f"controller.rate_limit_rad_s={limit}").run(world=i))
         np.testing.assert_array_equal(many["u_rad_s"][:, i], one["u_rad_s"])
@@ -131,7 +131,7 @@ def test_what_the_bench_gives_is_no_parameter() -> None:
 def test_a_law_that_uses_the_noise_keeps_worlds_of_other_noise_apart() -> None:
     experiment = push_recovery(*SHORT, "controller.kind=lqg")
     with pytest.raises(InputError, match="the noise that the law is told differs"):
-        experiment.run_many(2, vary={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
+        experiment.run_many(2, settings={"sensors.accelerometer.noise_density_ug_rthz": [200.0, 400.0]})
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ def experiment() -> cmg_mj.Experiment:
 
 @cache
 def many() -> cmg_mj.Result:
-    return experiment().run_many(2, vary={"equilibrium_bias_deg": BIASES})
+    return experiment().run_many(2, settings={"equilibrium_bias_deg": BIASES})
 
 
 @cache

@@ -33,7 +33,7 @@ def experiment() -> Experiment:
 
 @cache
 def result() -> Result:
-    return experiment().run_many(4, vary={"equilibrium_bias_deg": BIASES})
+    return experiment().run_many(4, settings={"equilibrium_bias_deg": BIASES})
 
 
 ERROR = "velocity_rms_error_rad_s"
@@ -84,7 +84,7 @@ def test_groups_are_the_worlds_in_their_order() -> None:
 def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
     """World i at a varied setting is world i of the scenario with that setting, bit for bit."""
     alone = prepare(load_scenario("push_recovery", ["duration_s=1.0", "push=[]", "plant.equilibrium_bias_deg=1.0"]))
-    batch = experiment().run_many([5, 6], vary={"equilibrium_bias_deg": np.array([0.0, 1.0])})
+    batch = experiment().run_many([5, 6], settings={"equilibrium_bias_deg": np.array([0.0, 1.0])})
     assert batch.trajectory is not None
     rerun = alone.run(world=6).trajectory
     assert rerun is not None
@@ -113,12 +113,12 @@ def test_equal_settings_share_one_rig() -> None:
 )
 def test_what_cannot_vary_is_refused(vary: dict[str, Any], field: str) -> None:
     with pytest.raises(InputError, match=field):
-        experiment().run_many(2, vary=vary)
+        experiment().run_many(2, settings=vary)
 
 
 def test_plants_and_vary_are_not_given_together() -> None:
     with pytest.raises(InputError, match="not both"):
-        experiment().run_many(1, plants=[load_plant()], vary={"equilibrium_bias_deg": [0.0]})
+        experiment().run_many(1, plants=[load_plant()], settings={"equilibrium_bias_deg": [0.0]})
 
 
 def test_wrong_keys_and_groups_are_refused() -> None:

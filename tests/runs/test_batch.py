@@ -105,7 +105,7 @@ def test_each_world_may_have_its_own_rig(kind: str) -> None:
     """Large biases fall at once and at different times; in the batch each world keeps its own model."""
     setup = experiment(f"observer.kind={kind}", "metrics.fall_angle_deg=12")
     vary = {"equilibrium_bias_deg": BIASES}
-    batch = setup.run_many(len(BIASES), vary=vary)
+    batch = setup.run_many(len(BIASES), settings=vary)
     assert_same(batch, [one.run(world=i) for i, one in enumerate(setup.with_varied(vary))])
     ends = [outcome.time_s for outcome in batch.outcomes]
     assert [outcome.fell for outcome in batch.outcomes] == [True, False, False, False, False, True]

@@ -81,7 +81,7 @@ def test_these_are_all_fields_that_may_differ() -> None:
 def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...]) -> None:
     setup = experiment(observer, MOVING, *more)
     worlds = [5, 5, 0, 1, 2, 9]
-    pool = setup.run_many(worlds, vary=values())
+    pool = setup.run_many(worlds, settings=values())
     for i, (world_experiment, world) in enumerate(zip(setup.with_varied(values()), worlds, strict=True)):
         alone = world_experiment.run(world=world)
         assert pool.summaries[i] == alone.summaries[0]
@@ -97,13 +97,13 @@ def test_each_world_is_its_own_experiments(observer: str, more: tuple[str, ...])
 )
 def test_an_observer_that_uses_the_noise_keeps_worlds_of_other_noise_apart(kind: str, vary: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=f"the sensors' noise, which {kind} is told, differs"):
-        experiment(kind).run_many(2, vary=vary)
+        experiment(kind).run_many(2, settings=vary)
 
 
 def test_gains_by_other_weights_run_together() -> None:
     weights = [[100.0, 1.0, 1.0, 0.1], [10.0, 1.0, 1.0, 0.1]]
     setup = experiment("homogeneous", "controller.lqr.state_cost=[100.0, 1.0, 1.0, 0.1]")
-    result = setup.run_many([1, 1], vary={"controller.lqr.state_cost": weights}, keep_trajectory=False)
+    result = setup.run_many([1, 1], settings={"controller.lqr.state_cost": weights}, keep_trajectory=False)
     assert result.summaries[0] == setup.run(world=1).summaries[0] != result.summaries[1]
 
 

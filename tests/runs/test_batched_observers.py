@@ -35,7 +35,7 @@ def assert_alike(jobs: list[BatchJob], batches: list[int], keep_trajectory: bool
     alone = [run_batch(*job, keep_trajectory=keep_trajectory) for job in jobs]
     batches.clear()
     for a, b in zip(run_jobs(jobs, keep_trajectory=keep_trajectory), alone, strict=True):
-        assert (a.observers, list(a.worlds), a.seconds) == (b.observers, list(b.worlds), b.seconds)
+        assert (a.observers, list(a.world_ids), a.seconds) == (b.observers, list(b.world_ids), b.seconds)
         assert (a.outcomes, a.summaries) == (b.outcomes, b.summaries)
         if keep_trajectory:
             assert recorded(a).layout == recorded(b).layout
@@ -106,7 +106,7 @@ def test_an_open_loop_observer_knows_the_noise_of_its_own_world() -> None:
     noises = [100.0, 400.0, 400.0, 100.0]
     field = "sensors.accelerometer.noise_density_ug_rthz"
     homogeneous = push_recovery("duration_s=0.3", "push=[]")
-    together = homogeneous.run_many(4, vary={field: noises})
+    together = homogeneous.run_many(4, settings={field: noises})
     assert list(together.observers) == ["homogeneous", "gyro_free"]
     for world, noise in enumerate(noises):
         alone = homogeneous.with_settings({field: noise}).run(world=world)

@@ -141,7 +141,7 @@ def test_a_world_without_vibration_has_the_floor_and_the_others_do_not() -> None
     """In one batch; each world's summary is its own, as if it had run alone."""
     rig = experiment("duration_s=0.3")
     vary = {"sensors.accelerometer.vibration_mg": [0.0, 4.0]}
-    result = rig.run_many([1, 1], vary=vary)
+    result = rig.run_many([1, 1], settings=vary)
     for summary, one in zip(result.summaries, rig.with_varied(vary), strict=True):
         assert summary == one.run(world=1).summaries[0]
     floors = result.values("velocity_rms_error_rad_s", "floor_accel")

@@ -148,7 +148,7 @@ class ScissoredPairEnv(gymnasium.Env):
             plant = plant.with_own_model()
         self._physics = OneWorld(plant)
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
-            part.plant.interface, worlds=self._world
+            part.plant.interface, world_ids=self._world
         )
         gyro = scenario.sensors.mems_gyro
         noise = normals(seed, self._world, NoiseStream.MEMS_GYRO, gyro.channels)

@@ -103,7 +103,7 @@ def mount(
         )
     show(result.figures(), "\n".join(mount_report_lines(result)), as_json)
     if not as_json:
-        note_hints(result.prospects.hints)
+        note_hints(result.push_limits.hints)
         scenario = result.path.with_suffix(".toml")
         note(f"wrote {result.path} and {scenario}; try: {shell_command('cmg-mj', 'run', scenario)}")
         if result.plugin:

@@ -144,7 +144,7 @@ def _stands(design: Design, impulses: np.ndarray) -> np.ndarray:
     alone = dataclasses.replace(design, scenario=scenario.model_copy(update={"open_loop_observers": []}))
     gimbal_angle = GimbalAngle((1.0,) * model.gimbals, (0.0,) * model.gimbals)
     numbers = np.repeat(np.arange(WORLDS), len(impulses)).tolist()
-    controller = alone.controller(KnownPlant(plant.tilt, gimbal_angle, h), worlds=numbers)
+    controller = alone.controller(KnownPlant(plant.tilt, gimbal_angle, h), world_ids=numbers)
     physics = ReducedPhysics(plant, len(numbers), h)
     after = AFTER_TIME_CONSTANTS / ceiling(model, design.law.rate_limit).pole
     steps = math.ceil((BEFORE_S + PUSH_S + after) / h)
@@ -250,7 +250,7 @@ NOISY = 0.75
 
 
 @dataclass(frozen=True)
-class Prospects:
+class PushLimits:
     """Limits of a pair on a robot.
 
     Attributes:
@@ -331,7 +331,7 @@ class Prospects:
         return figures
 
 
-def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = True) -> Prospects:
+def push_limits(experiment: Experiment, axis: str = "", *, with_margin: bool = True) -> PushLimits:
     """Find the limits of a pair on a robot, by its reduced model.
 
     Args:
@@ -349,7 +349,7 @@ def prospects(experiment: Experiment, axis: str = "", *, with_margin: bool = Tru
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
     margin = push_margin(experiment.design) if with_margin else PushMargin(0.0, 0.0)
     poles = sliding_poles(experiment.law, plant)
-    return Prospects(plant.reduced, limit, margin, pole, poles)
+    return PushLimits(plant.reduced, limit, margin, pole, poles)
 
 
 SPIN_UP_S = 60.0

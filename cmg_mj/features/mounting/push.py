@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.features.mounting.limits import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS, Prospects
+from cmg_mj.features.mounting.limits import AFTER_TIME_CONSTANTS, PUSH_S, WORLDS, PushLimits
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.physics import ManyWorlds
 from cmg_mj.runs.batch import stack_worlds
@@ -87,7 +87,7 @@ class SimulatedPush(NamedTuple):
     servo_rate: float | None = None
     """Largest rate of a gimbal that it takes [rad/s]."""
     worlds: int = WORLDS
-    """Worlds that were tried without a push: ten, and twenty others where it is `Prospects.noisy`."""
+    """Worlds that were tried without a push: ten, and twenty others where it is `PushLimits.noisy`."""
 
     @property
     def falls(self) -> bool:
@@ -96,7 +96,7 @@ class SimulatedPush(NamedTuple):
 
 
 def simulated_push(
-    experiment: Experiment, limits: Prospects, axis: str = "", time_limit: TimeLimit | None = None
+    experiment: Experiment, limits: PushLimits, axis: str = "", time_limit: TimeLimit | None = None
 ) -> SimulatedPush:
     """Find the largest push that all worlds of a mounted robot stand, by bisection in MuJoCo.
 

@@ -24,7 +24,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     Yields:
         Lines.
     """
-    mounted, plant, figures = result.mounted, result.plant, result.prospects.figures()
+    mounted, plant, figures = result.mounted, result.plant, result.push_limits.figures()
     line = plant.axis.line
     joint = plant.model.joint(line.joint).name
     about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
@@ -49,13 +49,13 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
     )
     yield from _pivot(result)
-    margin = result.prospects.push_margin.median_impulse
+    margin = result.push_limits.push_margin.median_impulse
     reduced = (
         f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
-        f"{result.prospects.fraction_of_limit:.0%} of any controller's"
+        f"{result.push_limits.fraction_of_limit:.0%} of any controller's"
     )
     yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
-    low = math.degrees(result.prospects.limit.tilt) < LOW_LIMIT_DEG
+    low = math.degrees(result.push_limits.limit.tilt) < LOW_LIMIT_DEG
     if low or (result.simulated and result.simulated.falls):
         reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
         yield f"  with a pair of this size {reason}; take a larger --scale"
@@ -64,7 +64,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
 
 def _pivot(result: MountResult) -> Iterator[str]:
     """Say what a pivot that slides freely does to the tilt, and what the loop would be if the tilt did not know it."""
-    rig, poles = result.plant, result.prospects.sliding_poles
+    rig, poles = result.plant, result.push_limits.sliding_poles
     if poles:
         yield f"  its pivot {sliding_words(rig)}"
         yield (

@@ -10,7 +10,7 @@ from typing import Any
 import tomli_w
 
 from cmg_mj.features.export.names import LONGEST, RESERVED
-from cmg_mj.features.mounting.limits import PUSH_S, PairDemands, Prospects, pair_demands, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, PairDemands, PushLimits, pair_demands, push_limits
 from cmg_mj.features.mounting.mount import PLUGIN, MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import SimulatedPush, TimeLimit, simulated_push
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
@@ -44,7 +44,7 @@ class MountResult:
         path: The model's file; the scenario lies beside it.
         plant: The plant of the pair's axis.
         observer: Name of the observer in the loop.
-        prospects: Limits of the pair on this robot, of the reduced model.
+        push_limits: Limits of the pair on this robot, of the reduced model.
         simulated: The push that the robot stands in MuJoCo; None if that was not tried.
         demands: Demands of the pair on the robot.
         plugin: The plugin beside the model; None if there is none.
@@ -54,7 +54,7 @@ class MountResult:
     path: Path
     plant: Plant
     observer: str
-    prospects: Prospects
+    push_limits: PushLimits
     simulated: SimulatedPush | None
     demands: PairDemands
     plugin: Plugin | None = None
@@ -63,7 +63,7 @@ class MountResult:
         """Return the figures that `cmg-mj mount --json` prints."""
         simulated = self.simulated
         return {
-            **self.prospects.figures(),
+            **self.push_limits.figures(),
             "stand_unpushed": simulated and simulated.standing,
             "stand_unpushed_of": simulated and simulated.worlds,
             "stands_push_impulse_n_m_s": simulated and simulated.impulse,
@@ -118,7 +118,7 @@ def mount_and_write(
         experiment = write_scenario(mounted.save(model), mounted.path, observer, axis=axis)
         if with_plugin:  # what cannot be exported is refused before what takes a minute
             make_plugin(experiment, plugin_name(file), start="spinning")
-        limits = prospects(experiment, axis)
+        limits = push_limits(experiment, axis)
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, axis, time_limit)
         experiment = write_scenario(model, mounted.path, observer, limits, axis, simulated)
@@ -135,7 +135,7 @@ def write_scenario(
     model: Path,
     robot: Path,
     observer: str,
-    limits: Prospects | None = None,
+    limits: PushLimits | None = None,
     axis: str = "",
     simulated: SimulatedPush | None = None,
 ) -> Experiment:

@@ -48,11 +48,11 @@ def check_pivots(scenario: Scenario, plant: Plant) -> None:
 
 
 def moving_pivot(
-    pivots: Sequence[Pivot], plants: Sequence[Plant], seed: int, worlds: int | Sequence[int]
+    pivots: Sequence[Pivot], plants: Sequence[Plant], seed: int, world_ids: int | Sequence[int]
 ) -> PivotSignals:
     """Make the acceleration of the pivot as a disturbance; a size may be an array (n_worlds,)."""
     directions, *_ = [pivot_directions(plant, pivots) for plant in dict.fromkeys(plants)]
-    return PivotSignals(pivots, directions, seed, worlds, plants[0].timestep)
+    return PivotSignals(pivots, directions, seed, world_ids, plants[0].timestep)
 
 
 def describe_pivots(design: Design, plant: Plant) -> Judgement:

@@ -26,11 +26,11 @@ class BandLimitedNoise:
     Args:
         corner_hz: Half-power frequency [Hz].
         seed: The run's seed.
-        worlds: The number of one world, on floats, or the numbers of many, on arrays (n_worlds,).
+        world_ids: The number of one world, on floats, or the numbers of many, on arrays (n_worlds,).
         stream: The noise stream.
     """
 
-    def __init__(self, corner_hz: float, seed: int, worlds: int | Sequence[int], stream: int) -> None:
+    def __init__(self, corner_hz: float, seed: int, world_ids: int | Sequence[int], stream: int) -> None:
         self._dt = 1.0 / (POINTS_A_PERIOD * corner_hz)
         decay = math.sqrt(0.5) * 2.0 * math.pi * corner_hz * self._dt  # of the filter's poles, -decay +- i decay
         fading, c, s = math.exp(-decay), math.cos(decay), math.sin(decay)
@@ -41,7 +41,7 @@ class BandLimitedNoise:
         first = math.sqrt(1.0 - a * a - b * b)
         cross = -(a * d + b * e) / first
         self._spread = (first, cross, math.sqrt(1.0 - d * d - e * e - cross * cross))
-        self._source = lambda: normals(seed, worlds, stream, 2)
+        self._source = lambda: normals(seed, world_ids, stream, 2)
         self._begin()
 
     def _begin(self) -> None:
@@ -93,14 +93,14 @@ def _sine(frequency_hz: float, phase_deg: float) -> Mean:
     return mean
 
 
-def pivot_signal(pivot: Pivot, number: int, seed: int, worlds: int | Sequence[int]) -> Mean:
+def pivot_signal(pivot: Pivot, number: int, seed: int, world_ids: int | Sequence[int]) -> Mean:
     """Make the acceleration of one motion of the pivot.
 
     Args:
         pivot: The motion.
         number: Its number in the scenario: each has a noise stream of its own.
         seed: The run's seed.
-        worlds: The number of one world, on floats, or the numbers of many, on arrays.
+        world_ids: The number of one world, on floats, or the numbers of many, on arrays.
 
     Returns:
         A function: start and end of an interval of the run [s] -> the mean over it, (n_worlds,) if it differs [m/s^2].
@@ -116,7 +116,7 @@ def pivot_signal(pivot: Pivot, number: int, seed: int, worlds: int | Sequence[in
         unit = _mean_of(read_track(pivot.file or "", pivot.column).velocity)
     else:
         stream = NoiseStream.PIVOT.on_axis(number)
-        unit = _mean_of(BandLimitedNoise(pivot.corner_hz or 1.0, seed, worlds, stream).velocity)
+        unit = _mean_of(BandLimitedNoise(pivot.corner_hz or 1.0, seed, world_ids, stream).velocity)
     size, begin, lasts = pivot.size, pivot.start_s, pivot.duration_s
 
     def mean(start: float, end: float) -> Scalar:
@@ -138,7 +138,7 @@ class PivotSignals:
         pivots: The motions; a size may be an array (n_worlds,).
         directions: Unit vector of each, in the world's axes.
         seed: The run's seed.
-        worlds: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
+        world_ids: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
         timestep: Physics step of the disturbance [s].
     """
 
@@ -150,11 +150,11 @@ class PivotSignals:
         pivots: Sequence[Pivot],
         directions: Sequence[Sequence[float]],
         seed: int,
-        worlds: int | Sequence[int],
+        world_ids: int | Sequence[int],
         timestep: float = 0.0,
     ) -> None:
         self._timestep = timestep
-        signals = [pivot_signal(pivot, i, seed, worlds) for i, pivot in enumerate(pivots)]
+        signals = [pivot_signal(pivot, i, seed, world_ids) for i, pivot in enumerate(pivots)]
         self._parts = list(zip(signals, directions, strict=True))
 
     def mean(self, start: float, end: float) -> list[Scalar]:

@@ -38,7 +38,7 @@ class PluginLoop(ControlLoop):
         if any(state[STATUS] == FAILED for state in instance_states(model, data)):
             raise RunStopped(f"the plugin has stopped at t = {data.time:g} s")
         self.controller.control(self.step)
-        for name, part in zip(self.physics.axis_names, self.controller.parts, strict=True):
+        for name, part in zip(self.physics.axis_names, self.controller.axes, strict=True):
             _take_over(part, data, "/".join(filter(None, (INSTANCE, name))))
 
 

@@ -97,7 +97,7 @@ def require_stable_periods(experiment: Experiment) -> None:
     Raises:
         InputError: An axis would fall.
     """
-    for part in experiment.parts:
+    for part in experiment.axes:
         try:
             require_stable_period(part.design.law, part.plant.reduced)
         except InputError as error:
@@ -115,7 +115,7 @@ def make_plugin(
 ) -> PluginCode:
     """Generate a plugin's C and its model: see `plugin`. Its noise is that of a world, unless the model says other."""
     check_platform()
-    name = name_of(experiment.parts[0].design.observer(), name)
+    name = name_of(experiment.axes[0].design.observer(), name)
     rig = describe_rig(experiment, name, world)
     made = generate_plugin(rig, name)
     config = {"start": start, "build": made.build}
@@ -130,13 +130,13 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
         InputError: The scenario has an imperfection that no plugin has.
     """
     axes = []
-    for i, part in enumerate(experiment.parts):
+    for i, part in enumerate(experiment.axes):
         for field, clause in omissions(part.scenario).items():
             if field not in SIMULATED:
                 raise InputError(f"{field}: {clause}: a plugin does not have it")
         axis = part.plant.axis
         modules = tuple((module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules)
-        controller = part.design.controller(part.plant.interface, worlds=world, axis=i)
+        controller = part.design.controller(part.plant.interface, world_ids=world, axis=i)
         joint = mujoco.mj_id2name(part.plant.model, mujoco.mjtObj.mjOBJ_JOINT, axis.line.joint)
         axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))
     compensates = len(axes) > 1 and experiment.scenario.controller.compensate_turning

@@ -236,7 +236,7 @@ class StudioSession:
 
     def _plotted_tick(self, axis: int) -> PlottedTick:
         """Return the last tick of an axis."""
-        data, line, tick = self.data, self._lines[axis], self.controller.parts[axis].tick
+        data, line, tick = self.data, self._lines[axis], self.controller.axes[axis].tick
         assert tick is not None
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
         return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u)

@@ -35,7 +35,7 @@ def current_settings(scenario: Scenario) -> Settings:
 
 def choosable_observers(base: Experiment) -> tuple[str, ...]:
     """List the bundled observers, and the scenario's."""
-    return tuple(dict.fromkeys([*OBSERVERS, *(part.scenario.observer.kind for part in base.parts)]))
+    return tuple(dict.fromkeys([*OBSERVERS, *(part.scenario.observer.kind for part in base.axes)]))
 
 
 def changed_fields(base: Experiment, now: Experiment, values: FieldValues) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def changed_fields(base: Experiment, now: Experiment, values: FieldValues) -> di
                 inner = inner.get(part, {})
             inner.pop(last, None)
         if kind is not None:
-            (before,) = (part.scenario.observer for part in base.parts if part.plant.axis.name == axis)
+            (before,) = (part.scenario.observer for part in base.axes if part.plant.axis.name == axis)
             own = base.scenario.axes[axis].as_fields().get("observer", {})
             section["observer"] = own if before.kind == kind else {}
     return {"axes": axes, **fields} if axes else fields

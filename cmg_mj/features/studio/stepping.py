@@ -181,7 +181,7 @@ class Stepping(plugin.SimPlugin):
         """Describe the session for the panel."""
         live, axis = self.live, self._axis_index()
         now, data = live.now, live.data
-        part = now.parts[axis]
+        part = now.axes[axis]
         ticks = np.array([tick[axis] for tick in live.ticks if tick[axis].time_s < data.time - 1e-9]).reshape(-1, 5)
         return SessionState(
             title=now.scenario.title,

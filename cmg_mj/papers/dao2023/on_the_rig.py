@@ -35,7 +35,7 @@ def run(
     common = [f"seed={seed}", f"duration_s={DURATION_S}", "open_loop_observers=[]"]
     scenario = load_scenario("push_recovery", [*common, *settings]).model_copy(update={"push": list(pushes)})
     vary = {"equilibrium_bias_deg": biases_deg}
-    return prepare(scenario).run_many(len(biases_deg), vary=vary, keep_trajectory=keep_trajectory)
+    return prepare(scenario).run_many(len(biases_deg), settings=vary, keep_trajectory=keep_trajectory)
 
 
 def or_inf(errors: np.ndarray) -> np.ndarray:

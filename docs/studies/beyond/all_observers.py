@@ -51,7 +51,7 @@ def order_claim(rows: Sequence[Row]) -> Claim:
         conditions="" if len(ordered) == len(cells) else "The order turns round where noise is low or the bias large.",
         otherwise="Another order is found at every noise and bias tried.",
         figures={"rows": rows},
-        pictures=[_trade_off(rows)],
+        picture=_trade_off(rows),
     )
 
 

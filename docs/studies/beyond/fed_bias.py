@@ -70,7 +70,7 @@ def fed_bias_claim(rows: Sequence[dict[str, Any]]) -> Claim:
         conditions="" if len(helped_biases) == len(rows) else helpful_biases,
         otherwise="It helps at none of the biases tried.",
         figures={"rows": rows},
-        pictures=[_picture(rows)],
+        picture=_picture(rows),
     )
 
 

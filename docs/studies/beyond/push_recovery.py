@@ -34,7 +34,7 @@ def on_rigs(experiment: Experiment, worlds: int, field: str, values: Sequence[fl
     """
     values_by_world = [value for value in values for _ in range(worlds)]
     numbers = [*range(worlds)] * len(values)
-    return experiment.run_many(numbers, vary={field: values_by_world}, keep_trajectory=False).split(len(values))
+    return experiment.run_many(numbers, settings={field: values_by_world}, keep_trajectory=False).split(len(values))
 
 
 def gain(errors_before: np.ndarray, errors_after: np.ndarray) -> Interval | None:

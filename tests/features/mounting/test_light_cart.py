@@ -12,7 +12,7 @@ import pytest
 
 from cmg_mj.features.mounting import mount
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, push_limits
 from cmg_mj.features.mounting.push import TimeLimit
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.summary_keys import section
@@ -34,7 +34,7 @@ def light_cart(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
 
 def test_a_light_cart_that_is_free_stands(light_cart: Experiment) -> None:
     """Its pivot accelerates as the pole falls, which the tilt about the common mass centre does not show."""
-    limits = prospects(light_cart)
+    limits = push_limits(light_cart)
     assert light_cart.scenario.plant.pivot_slides
     assert limits.hints == []
     assert limits.sliding_poles is not None
@@ -72,7 +72,7 @@ def test_the_loops_pole_about_the_pivot_says_who_stands(cart_kg: float, stands: 
     spec = mujoco.MjSpec.from_string(cart_pole(cart_kg))
     model = mount(spec, "pole", axis="hinge", release=["slider"]).save(f"{cart_kg:g}.xml")
     experiment = write_scenario(model, model, "gyro_free")
-    poles = prospects(experiment, with_margin=False).sliding_poles
+    poles = push_limits(experiment, with_margin=False).sliding_poles
     assert poles is not None
     assert (poles.about_pivot < 0.0) == stands
     settings = {"seed": 11, "duration_s": 20.0, "plant.initial_tilt_deg": 1.0, "plant.pivot_slides": False}

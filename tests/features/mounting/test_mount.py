@@ -11,7 +11,7 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.limits import prospects
+from cmg_mj.features.mounting.limits import push_limits
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import axis_modules
@@ -89,7 +89,7 @@ def test_every_joint_is_held_where_it_stands() -> None:
     mounting = mount(mujoco.MjSpec.from_string(BALL), "pole")
     assert mounting.held == ("shoulder", "gripper")
     model = mounting.save("rig.xml")
-    outlook = prospects(write_scenario(model, model, "homogeneous"))
+    outlook = push_limits(write_scenario(model, model, "homogeneous"))
     assert not outlook.hints
     result = write_scenario(model, model, "homogeneous", outlook).run()
     assert result.stood.all()
@@ -177,7 +177,7 @@ def test_a_second_axis(tmp_path: Path) -> None:
     assert second.held == ()
     assert [equality.name for equality in second.spec.equalities] == []
     model = second.save("rig.xml")
-    outlook = prospects(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
+    outlook = push_limits(write_scenario(model, model, "homogeneous", axis="pitch"), "pitch")
     experiment = write_scenario(model, model, "homogeneous", outlook, "pitch")
     assert experiment.plant.axis_names == ["roll", "pitch"]
     assert (

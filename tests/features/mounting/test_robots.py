@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.limits import PUSH_S, Prospects, RecoverableLimit, ceiling, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, PushLimits, RecoverableLimit, ceiling, push_limits
 from cmg_mj.features.mounting.stance import simulated_pole
 from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
@@ -32,10 +32,10 @@ def robot_at_rest(
 
 
 @pytest.fixture(scope="module")
-def mounting(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experiment, Prospects, str]:
+def mounting(robot_at_rest: tuple[Experiment, RecoverableLimit, str]) -> tuple[Experiment, PushLimits, str]:
     """The same with all that `mount` says of it."""
     experiment, _, name = robot_at_rest
-    outlook = prospects(experiment)
+    outlook = push_limits(experiment)
     return write_scenario(experiment.plant.path, ROBOTS[name].path, "gyro_free", outlook), outlook, name
 
 
@@ -53,7 +53,7 @@ def surviving_worlds(
 
 
 @pytest.mark.slow
-def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, Prospects, str]) -> None:
+def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, PushLimits, str]) -> None:
     """The same with 0.6 E, once the gimbals have come back from the start: E is borne by gimbals that are upright."""
     experiment, outlook, _ = mounting
     tilt = min(1.0, 0.25 * math.degrees(outlook.limit.tilt))
@@ -63,7 +63,7 @@ def test_it_stands_thirty_seconds_with_a_push(mounting: tuple[Experiment, Prospe
 
 
 @pytest.mark.slow
-def test_it_recovers_from_what_the_reduced_model_says(mounting: tuple[Experiment, Prospects, str]) -> None:
+def test_it_recovers_from_what_the_reduced_model_says(mounting: tuple[Experiment, PushLimits, str]) -> None:
     """E is within 35 % of the simulation's: most stand 0.65 E and fall with E/0.65; all fall with 1.8 E."""
     experiment, outlook, _ = mounting
     assert not outlook.hints

@@ -15,7 +15,7 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, Prospects, PushMargin, ceiling, prospects
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, PushLimits, PushMargin, ceiling, push_limits
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
 from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
 from cmg_mj.plant.physics import OneWorld
@@ -32,9 +32,9 @@ MODEL = ReducedModel(0.3, 0.0, 0.0011, 314.0, 6.0, 2)
 LIMIT = ceiling(MODEL, 4.7)
 
 
-def limits(share: float = 0.8) -> Prospects:
+def limits(share: float = 0.8) -> PushLimits:
     E = share * LIMIT.push_impulse(PUSH_S)
-    return Prospects(MODEL, LIMIT, PushMargin(E, 0.9 * E), LIMIT.pole)
+    return PushLimits(MODEL, LIMIT, PushMargin(E, 0.9 * E), LIMIT.pole)
 
 
 class Stub:
@@ -125,7 +125,7 @@ def pushed(scenario: Scenario, torque: float, seed: int) -> int:
     push = {"push": [{"start_s": 3.0, "duration_s": PUSH_S, "torque_n_m": torque}], "plant.initial_tilt_deg": 0.0}
     pushes = experiment.with_settings(push)
     vary = {"push.0.torque_n_m": (torque * signs).tolist()}
-    return int(pushes.run_many(2 * WORLDS, vary=vary, keep_trajectory=False).stood.sum())
+    return int(pushes.run_many(2 * WORLDS, settings=vary, keep_trajectory=False).stood.sum())
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_what_is_said_is_stood_on_new_seeds(name: str) -> None:
     text, options = ROBOTS[name]
     model = mount(mujoco.MjSpec.from_string(text), **options).save("rig.xml")
     experiment = write_scenario(model, model, "gyro_free")
-    result = simulated_push.simulated_push(experiment, prospects(experiment), time_limit=TimeLimit(1000.0))
+    result = simulated_push.simulated_push(experiment, push_limits(experiment), time_limit=TimeLimit(1000.0))
     assert (result.standing, result.complete) == (WORLDS, True)
     assert result.impulse > 0.0
     for seed in (1, 2):

@@ -62,7 +62,7 @@ def test_a_failure_in_the_middle_leaves_what_there_was(monkeypatch: pytest.Monke
     def fail(*_: object, **__: object) -> None:
         raise InputError(f"{next(Path().glob('.*.partial.a.xml'))}: fails")
 
-    monkeypatch.setattr("cmg_mj.features.mounting.write.prospects", fail)
+    monkeypatch.setattr("cmg_mj.features.mounting.write.push_limits", fail)
     assert "a.xml: fails" in cmg_mj(*MOUNT, "-o", "a.xml", "--overwrite").complaint
     assert files() == ["a.toml", "a.xml"]
     assert [Path(name).read_bytes() for name in files()] == before

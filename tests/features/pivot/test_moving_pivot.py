@@ -144,7 +144,7 @@ def test_one_world_of_many_is_the_world_alone() -> None:
     alone = rig.run(world=3).trajectory
     many = rig.run_many([5, 3, 0]).trajectory
     vary = {"pivot.0.acceleration_m_s2": [0.1, 0.3], "equilibrium_bias_deg": [0.0, 0.5]}
-    varied = rig.run_many([3, 3], vary=vary).trajectory
+    varied = rig.run_many([3, 3], settings=vary).trajectory
     assert alone is not None
     assert many is not None
     assert varied is not None
@@ -191,7 +191,7 @@ def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
     rig = experiment(NOISE, "duration_s=0.3")
     expected = rig.run().trajectory
     plant, pivots = rig.plant.with_own_model(), rig.scenario.section("pivot")
-    pivot = PivotSignals(pivots, pivot_directions(plant, pivots), seed=0, worlds=0)
+    pivot = PivotSignals(pivots, pivot_directions(plant, pivots), seed=0, world_ids=0)
     still = plant.model.opt.gravity.copy()
     controller, data = rig.controller(), plant.new_data()
     tilts = []

@@ -53,7 +53,7 @@ def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[]
         has_ticked = step()
         if has_ticked:
             row = [time]
-            for line, part in zip(lines, live.controller.parts, strict=True):
+            for line, part in zip(lines, live.controller.axes, strict=True):
                 tick = part.tick
                 assert tick is not None
                 push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))

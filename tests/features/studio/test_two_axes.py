@@ -76,13 +76,13 @@ def test_what_is_chosen_is_chosen_on_all_axes() -> None:
         live = studio.live
         studio.run(0.5)
         studio.send(ChangeSettings({OBSERVER: "linear"}))
-        scenarios = [part.scenario for part in live.now.parts]
+        scenarios = [part.scenario for part in live.now.axes]
         assert [scenario.observer.kind for scenario in scenarios] == ["linear", "linear"]
         assert [scenario.controller.feedback for scenario in scenarios] == ["observer", "truth"]
         studio.send(ChangeSettings({FEEDBACK: "fog"}), ChangeSettings({BIAS: 0.5}), ChangeSettings({NOISE: 0.0}))
-        for scenario in (part.scenario for part in live.now.parts):
+        for scenario in (part.scenario for part in live.now.axes):
             assert (scenario.controller.feedback, scenario.plant.equilibrium_bias_deg) == ("fog", 0.5)
             assert scenario.sensors.accelerometer.noise_density_ug_rthz == 0.0
         np.testing.assert_array_equal(live.model.body_ipos, live.now.plant.model.body_ipos)
         studio.send(ChangeSettings({OBSERVER: "homogeneous"}))
-        assert [part.scenario.observer.parameters for part in live.now.parts] == [{"k1": 50.0}, {"k1": 40.0}]
+        assert [part.scenario.observer.parameters for part in live.now.axes] == [{"k1": 50.0}, {"k1": 40.0}]
