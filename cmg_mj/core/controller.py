@@ -142,7 +142,7 @@ class Controller:
         self.body_rate: Scalar = math.nan
         """Rate of the frame along the tilt axis at the last update, as a perfect gyro on it shows [rad/s]."""
         self.coriolis: Scalar | None = None
-        """Coriolis part of the measured angular acceleration, on a plant that turns [rad/s^2]."""
+        """Coriolis part of the measured angular acceleration, which the stage between axes sets [rad/s^2]."""
         self.step: int | None = None
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))

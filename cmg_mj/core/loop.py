@@ -34,7 +34,8 @@ class Disturbance(Protocol):
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add what acts from a physics step on, held or averaged for so many steps, until the next instant.
 
-        Torques that stay are the same sequence.
+        Disturbances act one after the other: each is given what those before it made. Torques that stay are the same
+        sequence.
         """
         ...
 

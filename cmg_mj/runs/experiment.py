@@ -167,8 +167,8 @@ class Experiment:
         Args:
             worlds: How many, or their numbers: world i has the same noise wherever it stands.
             plants: A plant a world, if they differ.
-            settings: The same by settings: a field -> its value in each world, such as {"push.0.torque_n_m": [1.0, 2.0],
-                "equilibrium_bias_deg": [0.0, 0.5]}. Only numbers that worlds of one batch may differ in: see `batch.py`.
+            settings: The same by settings: a field -> its value in each world, {"equilibrium_bias_deg": [0.0, 0.5],
+                "push.0.torque_n_m": [1.0, 2.0]}. Only numbers that worlds of a batch may differ in: see `batch.py`.
             **options: Those of `simulate`.
 
         Returns:

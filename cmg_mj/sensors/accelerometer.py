@@ -14,7 +14,7 @@ from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
 from cmg_mj.stages.low_pass import LowPass, LowPassSettings
 from cmg_mj.stages.mounting_errors import PERFECT, MountingErrorsSettings, mounting_errors
-from cmg_mj.stages.pair import white
+from cmg_mj.stages.pair import PairSettings, white
 from cmg_mj.stages.skew import Skew, SkewSettings
 from cmg_mj.stages.vibration import VibrationSettings, vibration
 
@@ -35,7 +35,7 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
     def imperfections(self) -> dict[str, float | tuple[float, ...]]:
         """Imperfections that are switched on beyond noise, range and resolution: field -> its value."""
         names = [field.name for field in dataclasses.fields(self)]
-        optional = ["bias_mg", *names[names.index("scale_error") :]]
+        optional = ["bias_mg", *(name for name in names if name not in PairSettings.__dataclass_fields__)]
         if not self.vibration_mg:
             optional.remove("vibration_band_hz")
         return {name: value for name in optional if (value := getattr(self, name)) not in (0.0, (0.0, 0.0), ())}

@@ -142,8 +142,8 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
         raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
     if trajectory.axes:
         raise InputError(
-            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; save one of them "
-            f"from Python: Trajectory.load(path).along({trajectory.axes[0]!r}).save(...)"
+            f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; run it with the "
+            f'others locked, as with --set plant.locked_axes=["{trajectory.axes[-1]}"]'
         )
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
