@@ -111,7 +111,7 @@ MUTATIONS = [
             f"free_pivot: {name}", OBSERVERS + "free_pivot.py", rf"\n    {name}: (?:Positive|NonNegative) = " + NUMBER
         )
         for name in (
-            *("rate_start", "bias_start", "bias_walk", "jerk", "pivot_hz", "pivot_start", "pivot_floor"),
+            *("bias_start", "pivot_hz", "pivot_start", "pivot_floor"),  # the others are those of gyro_free
             *("pivot_s", "learn_s", "surprise", "noise_s", "hurry", "doubt", "inflation"),
         )
     ),
