@@ -98,13 +98,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _status(arguments: Sequence[str]) -> Any:
     """Run a command, print its error if there is one, and return its exit status."""
+    if "_CMG_MJ_COMPLETE" in os.environ:  # a shell asks for completions
+        cli.main(prog_name="cmg-mj")
     if not arguments:
         click.echo(cli.make_context("cmg-mj", [], resilient_parsing=True).get_help(), err=True)
         return WRONG_INPUT
     status = WRONG_INPUT
     try:
-        if "_CMG_MJ_COMPLETE" in os.environ:  # a shell asks for completions
-            cli.main(prog_name="cmg-mj")
         with cli.make_context("cmg-mj", list(arguments)) as context:
             cli.invoke(context)
         return DONE

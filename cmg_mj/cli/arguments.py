@@ -25,6 +25,8 @@ Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
 
 OVERWRITE = "cmg_mj.overwrite"
+MAX_NUMBER = 2**63 - 1
+"""Largest seed and number of a world, which tables of results can hold."""
 MAX_WORLDS = 10_000
 """Most worlds of a batch; one takes about 0.1 MB of memory."""
 
@@ -148,7 +150,7 @@ def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: b
 
 def seed_option() -> Decorator:
     """Make the option `--seed`."""
-    return click.option("--seed", type=click.IntRange(0), metavar="N", help="Seed of the sensors' noise.")
+    return click.option("--seed", type=click.IntRange(0, MAX_NUMBER), metavar="N", help="Seed of the sensors' noise.")
 
 
 def out_option() -> Decorator:

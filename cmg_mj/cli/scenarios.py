@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from cmg_mj.cli.arguments import (
+    MAX_NUMBER,
     RunArguments,
     markdown_option,
     observer_option,
@@ -50,7 +51,7 @@ from cmg_mj.inputs.features import DRIVERS
 )
 @click.option(
     "--world",
-    type=click.IntRange(0),
+    type=click.IntRange(0, MAX_NUMBER),
     default=0,
     metavar="N",
     help="Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -51,9 +51,10 @@ def instants(end: int, grid: int, edges: Iterable[int] = ()) -> Iterator[tuple[i
     Yields:
         The step, and the steps until the next instant.
     """
-    beside = [end, *(step for step in edges if step < end)]
-    for start, stop in pairwise(np.union1d(np.arange(0, end, grid), beside).astype(int).tolist()):
-        yield start, stop - start
+    for start, last in pairwise(sorted({0, end, *(step for step in edges if step < end)})):
+        for stop in chain(range((start // grid + 1) * grid, last, grid), (last,)):
+            yield start, stop - start
+            start = stop
 
 
 Joints = Sequence[Scalar] | np.ndarray

@@ -90,12 +90,12 @@ def shown(limit: float, step: float) -> SensorStage:
     """
     limits, steps = repeat(limit), repeat(step)
 
-    def shown(signal: Any, ideal: IdealReading) -> Any:
+    def digital(signal: Any, ideal: IdealReading) -> Any:
         if isinstance(signal, np.ndarray):
             return digitise(signal, limit, step)
         return list(map(digitise, signal, limits, steps))
 
-    return shown
+    return digital
 
 
 class SampledSensor:

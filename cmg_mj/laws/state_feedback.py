@@ -58,7 +58,7 @@ def solved(
     try:
         gain, P, poles = (np.asarray(part) for part in solve())
         if not (np.all(np.isfinite(gain)) and is_stable(poles)):
-            raise ValueError("give x_e a positive weight, and what is tiny a larger one")
+            raise ValueError("give what is zero or tiny a larger one")
     except Exception as error:
         raise InputError(f"{what}: no stabilising gain for these weights ({error})") from error
     return gain, P

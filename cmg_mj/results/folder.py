@@ -117,6 +117,8 @@ class RunFolder:
         except OSError:
             if os.path.lexists(place):  # another run has just come here
                 return False
+            if old.exists():
+                old.rename(place)
             raise
         shutil.rmtree(old, ignore_errors=True)
         return True

@@ -272,11 +272,13 @@ class Trajectory(NamedColumns):
         try:
             with open(path, "rb") as file:
                 table = pq.read_table(file)
-            stored = json.loads(table.schema.metadata[METADATA_KEY])
+        except (OSError, pa.ArrowException) as error:
+            raise InputError(f"{path}: not a trajectory: {' '.join(str(error).split())}") from error
+        try:
+            stored = json.loads((table.schema.metadata or {})[METADATA_KEY])
             layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
-        except (OSError, pa.ArrowException, ValueError, LookupError, TypeError, AttributeError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(
-                f"{path}: not a trajectory, or of an earlier version of cmg-mj, then run its scenario.toml again: "
-                f"{' '.join(str(error).split())}"
+                f"{path}: a Parquet file, but no trajectory of this version of cmg-mj; run its scenario.toml again"
             ) from error
         return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)

@@ -66,6 +66,8 @@ def compare(scenario: Scenario | str, observers: Sequence[str], worlds: int = WO
     """
     if isinstance(observers, str) or not observers or len(set(observers)) < len(observers):
         raise InputError(f"observers = {observers!r}: must be a list of different names")
+    if worlds < 1:
+        raise InputError(f"worlds = {worlds}: must be at least 1")
     base = load_scenario(scenario) if isinstance(scenario, str) else scenario
     compared = comparison.compare(comparison.prepare_comparison(base, observers), worlds)
     return Comparison({entry.kind: entry for entry in compared})

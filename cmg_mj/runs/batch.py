@@ -197,8 +197,10 @@ def world_value(value: T, world: int) -> T:
         return tuple(world_value(part, world) for part in value)  # type: ignore[return-value]
     if not dataclasses.is_dataclass(value):
         return value
-    fields = dataclasses.fields(value)
-    return _with_fields(value, {field.name: world_value(getattr(value, field.name), world) for field in fields})
+    parts = {field.name: world_value(getattr(value, field.name), world) for field in dataclasses.fields(value)}
+    if all(part is getattr(value, name) for name, part in parts.items()):
+        return value
+    return _with_fields(value, parts)
 
 
 def _with_fields(like: Any, fields: Mapping[str, Any]) -> Any:

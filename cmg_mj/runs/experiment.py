@@ -209,12 +209,15 @@ class Experiment:
         """
         lists = [values.tolist() if isinstance(values, np.ndarray) else values for values in settings.values()]
         are_lists = all(isinstance(values, Sequence) and not isinstance(values, str) for values in lists)
-        if not are_lists or len({len(values) for values in lists}) != 1:
+        if not lists or not are_lists or len({len(values) for values in lists}) != 1:
             raise InputError(
                 f"settings: {', '.join(settings)}: must be lists of values by field, as many values each, one a world, "
                 'such as {"equilibrium_bias_deg": [0.0, 0.5]}'
             )
         of_plant = {field.name for field in dataclasses.fields(self.scenario.plant)}
+        for name in settings:
+            if "." not in name and name not in (*of_plant, *Scenario.model_fields):
+                raise InputError(f"settings: {name!r}: no field of [plant]; {nearest(name, of_plant)}")
         names = [f"plant.{name}" if name in of_plant else name for name in settings]
         rows = [dict(zip(names, row, strict=True)) for row in zip(*lists, strict=True)]
         experiments = {key: self.with_settings(row) for key, row in {repr(row): row for row in rows}.items()}

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, TypedDict, Unpack
 
 from cmg_mj.core.controller import AngleSource, Controller, Feedback, KnownPlant
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
@@ -219,6 +219,9 @@ def make_controller(
     Raises:
         InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
     """
+    for name in options:
+        if name not in StageOptions.__annotations__:
+            raise InputError(f"{name}: no such option; {nearest(name, StageOptions.__annotations__)}")
     commands = notches(options.pop("notch_hz", 0.0), law)
     memories = trims(options.pop("bias_trim_s", 0.0), law, extra_signals(observer), plant.timestep)
     return make(observer, law, sensors, plant, commands=commands, memories=memories, **options)

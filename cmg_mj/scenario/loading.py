@@ -12,7 +12,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.features import FEATURES
 from cmg_mj.inputs.files import bundled, find, folder, read_text
 from cmg_mj.inputs.overrides import override
-from cmg_mj.scenario.schema import ControllerSettings, Scenario, parse_scenario
+from cmg_mj.scenario.schema import Scenario, parse_scenario
 
 MAX_BYTES = 1_000_000
 """A scenario file is smaller; the longest that a run writes has three thousand bytes."""
@@ -36,14 +36,14 @@ def load_scenario(
         InputError: The file does not exist, is no TOML, or has a field that is unknown or not allowed.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    fields = fields or _read(path, name)
+    fields = _read(path, name) if fields is None else fields
     if path.stem in bundled("scenarios"):
         fields.setdefault("based_on", path.stem)
     changes, names = [], []
     if observer is not None:
         changes.append(f"--observer {observer}")
-        fields = parse_scenario(fields, name).with_observer(observer).as_fields()
-    law = _law(fields)
+        _take_observer(fields, observer)
+    law = _kind_of(fields, "controller")
     for setting in overrides:
         changes.append(f"--set {setting}")
         names.append(setting.partition("=")[0].strip())
@@ -51,19 +51,31 @@ def load_scenario(
     # Of gains and lqr, the one that --set does not give goes; with another law both.
     set_sections = {".".join(f"{field}.".split(".")[:2]) for field in names}
     unset = [field for field in ("gains", "lqr") if f"controller.{field}" not in set_sections]
-    if len(unset) == 1 or _law(fields) != law:
+    if len(unset) == 1 or _kind_of(fields, "controller") != law:
         for field in unset:
-            fields["controller"].pop(field, None)
+            fields.get("controller", {}).pop(field, None)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if "plant.model" not in names:
         scenario = find_model(scenario, path.parent)
     return find_files(scenario, path.parent)
 
 
-def _law(fields: Mapping[str, Any]) -> Any:
-    """Return the kind of law that a file names, or the default."""
-    section, usual = fields.get("controller"), ControllerSettings().kind
-    return section.get("kind", usual) if isinstance(section, Mapping) else usual
+def _take_observer(fields: dict[str, Any], observer: str) -> None:
+    """Take another observer than the file's, on all axes; parameters that are another's go."""
+    common = _kind_of(fields, "observer")
+    axes = fields.get("axes")
+    for axis in axes.values() if isinstance(axes, dict) else ():
+        if isinstance(axis, dict) and _kind_of(axis, "observer", common) != observer:
+            axis.pop("observer", None)
+    if common != observer:
+        fields["observer"] = {"kind": observer}
+
+
+def _kind_of(fields: Mapping[str, Any], section: str, usual: Any = None) -> Any:
+    """Return the kind of observer or law that a file names, or the default."""
+    usual = usual or getattr(Scenario(), section).kind
+    parts = fields.get(section, {})
+    return parts.get("kind", usual) if isinstance(parts, Mapping) else None
 
 
 def _read(path: Path, name: str) -> dict[str, Any]:

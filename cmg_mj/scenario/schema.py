@@ -344,11 +344,11 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
         scenario = Scenario.model_validate_json(json.dumps(fields, default=as_json), strict=True).with_source(source)
         wrong = out_of_size(fields)
     except ValidationError as error:
-        scenario, wrong = Scenario(), complaints(Scenario, error.errors(), fields)
+        scenario, wrong = None, complaints(Scenario, error.errors(), fields)
     clauses = list(dict.fromkeys([*wrong, *_unknown_to_bench_law(fields)]))
     if len(clauses) > MAX_CLAUSES:
         clauses[MAX_CLAUSES:] = [f"and {len(clauses) - MAX_CLAUSES} more"]
-    if clauses:
+    if clauses or scenario is None:
         raise InputError(located(source, "; ".join(clauses)))
     _ = scenario.axis_scenarios  # their fields are checked, too
     return scenario

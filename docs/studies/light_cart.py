@@ -54,7 +54,7 @@ def mounted(mass: float, friction: float = 0.0, damping: float = 5e-4) -> tuple[
         spec = mujoco.MjSpec.from_string(cart_pole(mass, friction, damping))
         model = mount(spec, "pole", axis="hinge", release=["slider"]).save(Path(folder) / "cart.xml")
         experiment = write_scenario(model, model, "gyro_free")
-    return experiment, push_limits(experiment, with_margin=False)
+    return experiment, push_limits(experiment)
 
 
 def standing(

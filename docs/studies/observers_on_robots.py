@@ -29,6 +29,7 @@ from cmg_mj.core.reduced_model import hold_matrices
 from cmg_mj.features.mounting.limits import push_limits, push_margin
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.features.tuning import Recorded, halves, recorder, tune
+from cmg_mj.features.tuning.search import StopSearch
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
@@ -110,13 +111,18 @@ def fits(experiment: Experiment, kind: str, held: Recorded) -> dict:
 def fit_tuned(experiment: Experiment, kind: str, recorded: Callable[..., Recorded]) -> dict:
     """The fit of tuned parameters on the held-out worlds."""
     end = time.process_time() + TUNING_S
+
+    def on_share(share: float) -> None:
+        if time.process_time() > end:
+            raise StopSearch
+
     level = tune(
         with_parameters(experiment.scenario, kind, scaled_parameters(kind, experiment.plant.reduced)),
         worlds=WORLDS,
         parameters=TUNED[kind],
         starts=1,
         recorded=recorded,
-        stop=lambda: time.process_time() > end,
+        on_share=on_share,
     ).levels[0]
     sizes = {name: float(f"{size:.3g}") for name, size in level.sizes.items()}
     return {"tuned": level.fit, "sizes": sizes}

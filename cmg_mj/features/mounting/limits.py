@@ -331,13 +331,12 @@ class PushLimits:
         return figures
 
 
-def push_limits(experiment: Experiment, axis: str = "", *, with_margin: bool = True) -> PushLimits:
+def push_limits(experiment: Experiment, axis: str = "") -> PushLimits:
     """Find the limits of a pair on a robot, by its reduced model.
 
     Args:
         experiment: The robot and its controller.
         axis: Name of the axis, if there are several.
-        with_margin: Whether to find E, which takes longest; otherwise it is 0.
 
     Returns:
         The limits.
@@ -347,7 +346,7 @@ def push_limits(experiment: Experiment, axis: str = "", *, with_margin: bool = T
     limit = ceiling(plant.reduced, experiment.law.rate_limit)
     with set_control_callback(None), quiet():
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
-    margin = push_margin(experiment.design) if with_margin else PushMargin(0.0, 0.0)
+    margin = push_margin(experiment.design)
     poles = sliding_poles(experiment.law, plant)
     return PushLimits(plant.reduced, limit, margin, pole, poles)
 

@@ -75,7 +75,7 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
     try:
         table = pacsv.read_csv(path)
         names = [name.strip() for name in table.column_names]
-        if len(names) < 2 or names[0][:1] in "+-.0123456789":
+        if len(names) < 2 or names[0][:1] in tuple("+-.0123456789"):
             raise InputError(f"{path}: line 1: must be a heading of at least two columns, as time_s,acceleration_m_s2")
         if column is None and len(names) > 2:
             known = shown(", ".join(names[1:]))
@@ -83,6 +83,9 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
         if column is not None and column not in names[1:]:
             raise InputError(f"{path}: no column {shown(column)}; {nearest(column, names[1:])}")
         number = 1 if column is None else names.index(column, 1)
+        for i in (0, number):
+            if not (pa.types.is_floating(table[i].type) or pa.types.is_integer(table[i].type)):
+                raise InputError(f"{path}: column {shown(names[i])}: must hold numbers alone, with a point and no unit")
         times, accelerations = (table[i].cast(pa.float64()).to_numpy() for i in (0, number))
     except (pa.ArrowException, OSError, UnicodeError) as error:
         raise InputError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from error

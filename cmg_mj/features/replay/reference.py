@@ -145,7 +145,7 @@ def judge(log: Log, aligned: Alignment) -> str:
     lag_error, scale_error, offset_error = (math.inf if error is None else error for error in errors)
     options = log.options
     scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)
-    if correlation <= -AGREES:
+    if correlation <= -AGREES or scale < -CLEAR * scale_error:
         return f"The reference counts the other way (correlation {correlation:.2f}): --scale rate={-scale_set:g}."
     if correlation < AGREES:
         return (
@@ -157,7 +157,7 @@ def judge(log: Log, aligned: Alignment) -> str:
     comes, cures = "", []
     if lag is not None and abs(lag) > max(LATE * max(log.dt, log.row_period_s or 0.0), CLEAR * lag_error):
         comes = f"the reference comes {abs(lag) * 1e3:.4g} ms {'behind' if lag > 0.0 else 'before'}; "
-        cures.append(f"--delay {options.delay_s + lag:.4g}")
+        cures.append(f"--delay {options.delay_s + lag:.6g}")
     factor = 1.0
     if abs(scale - 1.0) > max(OFF, CLEAR * scale_error):
         factor = scale

@@ -28,7 +28,7 @@ from cmg_mj.scenario.resolve import versions
 if TYPE_CHECKING:
     from distributed import Client, Future, Worker
 
-ADDRESS = re.compile(r"local:(?P<workers>[1-9]\d{0,2})|(?!local:)((tcp|tls)://)?[^/\s]+:\d{1,5}")
+ADDRESS = re.compile(r"local:(?P<workers>[1-9]\d?|1\d\d|2[0-4]\d|25[0-6])|(?!local:)((tcp|tls)://)?[^/\s]+:\d{1,5}")
 PATIENCE_S = 10.0
 """Time for which a cluster may fail to answer."""
 LOOK_S = 0.25

@@ -90,7 +90,8 @@ def sweep(
         return
     if study.trials > MAX_TRIALS and not yes:
         raise InputError(
-            f"--vary: {study.trials} trials; for more than {MAX_TRIALS} give --yes (--dry-run prints time and memory)"
+            f"{study.n_points} points, {study.trials} trials: for more than {MAX_TRIALS} give --yes "
+            "(--dry-run prints time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:

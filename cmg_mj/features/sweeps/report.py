@@ -109,7 +109,7 @@ def report(trials: Trials, pictures: Sequence[Picture]) -> str:
 
 def summary(trials: Trials) -> str:
     """Write for the terminal: cells, reasons of unfinished trials."""
-    return "\n\n".join([*_cells(trials), *_unfinished(trials)])
+    return "\n\n".join([*_cells(trials), *_unfinished(trials)[1:]])
 
 
 def _varied(study: SweepStudy) -> list[str]:

@@ -36,7 +36,6 @@ RELEVANT = 1.01
 """A smaller ratio of two errors on logs is no difference."""
 
 OnShare = Callable[[float], None]
-Stop = Callable[[], bool]
 """Asked before every evaluation: from the first yes on none is made, and the best so far counts."""
 
 
@@ -211,7 +210,6 @@ class ParameterFit:
         chosen: Names of the numbers to tune; by default all.
         ranges: Number -> smallest and largest size.
         starts: Starts of a search in several dimensions.
-        stop: Whether to end the search early.
 
     Attributes:
         start_parameters: All given parameters.
@@ -227,9 +225,8 @@ class ParameterFit:
         chosen: Sequence[str],
         ranges: Mapping[str, tuple[float, float]] | None,
         starts: int = 2,
-        stop: Stop = lambda: False,
     ) -> None:
-        self.kind, self._starts, self._stop, self._stopped = kind, starts, stop, False
+        self.kind, self._starts = kind, starts
         self.start_parameters = parameters_of(kind, make(**given), given)
         self.numbers = numbers_of(kind, self.start_parameters, make, chosen, ranges or {})
         self.insensitive_parameters: list[str] = []
@@ -255,7 +252,7 @@ class ParameterFit:
             make: Makes what the data score from parameters: an observer, or one for each log.
             fitted: The fitted data.
             held_out: The held-out data.
-            on_share: Called with the completed share of the evaluations.
+            on_share: Called with the completed share of the evaluations; it may raise `StopSearch`.
             noise: Noise density of the accelerometers, for the result [ug/sqrt(Hz)].
 
         Returns:
@@ -279,9 +276,6 @@ class ParameterFit:
 
         def loss(sizes: Sequence[float]) -> float:
             nonlocal count
-            self._stopped = self._stopped or self._stop()
-            if self._stopped:
-                raise StopSearch
             count += 1
             if on_share:
                 on_share(min(count / expected, 1.0))
@@ -300,7 +294,7 @@ class ParameterFit:
         # The best values at the noise before are near the best at this one.
         near = [replace(n, start=self._best.get(n.name, n.start)) for n in self.numbers]
         found, best_loss = search(loss, near, starts=self._starts)
-        if not math.isfinite(best_loss) and not self._stopped:
+        if not math.isfinite(min(best_loss, given_loss)):
             raise InputError(f"{self.kind}: no parameters give an estimate that stays finite")
         rounded = self._named([float(f"{size:.{DIGITS}g}") for size in found])
         if given_loss <= best_loss and all(n.low <= abs(n.start) <= n.high for n in self.numbers):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
@@ -13,8 +14,8 @@ import numpy as np
 from cmg_mj.core.controller import Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs
-from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Stop, Study
-from cmg_mj.features.tuning.search import crossing
+from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study
+from cmg_mj.features.tuning.search import StopSearch, crossing
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import Observer, make_observer
 from cmg_mj.results.intervals import PairedVerdict
@@ -62,7 +63,7 @@ class Recorded(ScoringData):
         self.references = [trajectory["fog_rad_s"]]
         self.stretches = [(0, inside(trajectory["time_s"], windows))]
         steps = np.diff(trajectory["x2_rad_s"], axis=0) / np.diff(trajectory["time_s"])[:, None]
-        self.largest_acceleration = float(np.abs(steps).max())
+        self.largest_acceleration = float(np.abs(steps).max(initial=0.0))
 
     def rates(self, observers: Observer) -> list[np.ndarray]:
         """See `ScoringData`."""
@@ -227,7 +228,6 @@ def tune(
     starts: int = 2,
     recorded: Callable[[range, float], Recorded] | None = None,
     on_share: OnShare | None = None,
-    stop: Stop = lambda: False,
 ) -> TuningResult:
     """Fit the parameters of the scenario's observer to the gyro.
 
@@ -242,8 +242,7 @@ def tune(
         warm_up_s: Time replayed before the window [s].
         starts: Starts of a search in several dimensions.
         recorded: Returns recordings made before, as `recorder` does; by default they are made here, all at once.
-        on_share: Called now and then with the completed share.
-        stop: Whether to end the search early, with the best parameters so far.
+        on_share: Called now and then with the completed share; if it raises `StopSearch`, the best so far are taken.
 
     Returns:
         The result. After an interrupt, it has the noise densities done until then.
@@ -260,7 +259,7 @@ def tune(
     experiment.require_single_axis("tuning")
     dt, model, noise = experiment.design.constructor_arguments
     make = partial(make_observer, kind, dt, model, noise)
-    fit = ParameterFit(kind, make, scenario.observer.parameters, parameters, ranges, starts, stop)
+    fit = ParameterFit(kind, make, scenario.observer.parameters, parameters, ranges, starts)
     recorded = recorded or recorder(scenario, halves(worlds, densities), warm_up_s=warm_up_s)
 
     levels: list[NoiseLevelResult] = []
@@ -274,7 +273,8 @@ def tune(
         noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
         try:
             levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
-            share(1.0)
+            with suppress(StopSearch):
+                share(1.0)
         except KeyboardInterrupt:
             if not levels:
                 raise

@@ -72,7 +72,7 @@ def test_the_loops_pole_about_the_pivot_says_who_stands(cart_kg: float, stands: 
     spec = mujoco.MjSpec.from_string(cart_pole(cart_kg))
     model = mount(spec, "pole", axis="hinge", release=["slider"]).save(f"{cart_kg:g}.xml")
     experiment = write_scenario(model, model, "gyro_free")
-    poles = push_limits(experiment, with_margin=False).sliding_poles
+    poles = push_limits(experiment).sliding_poles
     assert poles is not None
     assert (poles.about_pivot < 0.0) == stands
     settings = {"seed": 11, "duration_s": 20.0, "plant.initial_tilt_deg": 1.0, "plant.pivot_slides": False}

@@ -125,10 +125,11 @@ def test_going_back_in_time_gives_the_same_noise() -> None:
         ("t,a,b\n0,1,2\n1,1,2\n", None, "has the columns 'a, b'; name that of the acceleration with column"),
         ("t,a,b\n0,1,2\n1,1,2\n", "bb", "no column 'bb'; did you mean 'b'"),
         ("t,a\n0,1\n", None, "too few samples (1); a track has at least two"),
-        ("t,a\n0,1\n\n1,x\n", None, "Failed to parse string: 'x'"),
+        ("t,a\n0,1\n\n1,x\n", None, "column 'a': must hold numbers alone"),
         ("t,a\n0,1\n1,nan\n", None, "sample 2: nan m/s2 at 1 s: must be finite"),
         ("t,a\n0,1\n1\n", None, "Expected 2 columns, got 1"),
         ("t,a\n0,1\n1,2,5\n", None, "Expected 2 columns, got 3"),
+        ("t,a\n0,true\n1,false\n", None, "column 'a': must hold numbers alone"),
         ("t,a\n0,1\n0,2\n", None, "sample 2: the time 0 s does not follow 0 s"),
         (
             "t,a\n0,1\n1,9810\n",
@@ -149,7 +150,7 @@ def test_what_is_no_track_is_refused(text: str, column: str | None, message: str
 def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "track.csv"
     path.write_bytes(b"t,a\n0,\xff\xfe\n")
-    with pytest.raises(InputError, match="cannot be read as CSV"):
+    with pytest.raises(InputError, match="column 'a': must hold numbers"):
         read_track(str(path), None)
 
 

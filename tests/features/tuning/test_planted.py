@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.tuning import NoiseLevelResult, Recorded, best_noise, tune
+from cmg_mj.features.tuning.search import StopSearch
 from cmg_mj.observers import make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
@@ -167,14 +168,15 @@ def test_given_parameters_that_lose_the_observer_are_worse_than_any() -> None:
 def stopped_after(evaluations: int) -> NoiseLevelResult:
     asked = 0
 
-    def stop() -> bool:
+    def on_share(share: float) -> None:
         nonlocal asked
         asked += 1
-        return asked > evaluations
+        if asked > evaluations:
+            raise StopSearch
 
     scenario = load_scenario("observer_tuning").with_observer("linear")
     recorded = recorder("linear", lambda *_: {"tau": 0.0337123})
-    return tune(scenario, worlds=4, recorded=recorded, stop=stop).levels[0]
+    return tune(scenario, worlds=4, recorded=recorded, on_share=on_share).levels[0]
 
 
 @pytest.mark.parametrize("evaluations", [0, 1])

@@ -204,7 +204,7 @@ def test_a_comparison_as_a_mapping_and_a_frame() -> None:
         (["linear", "linear"], 2, "different names"),
         ("linear", 2, "different names"),
         ([], 2, "different names"),
-        (["linear"], 0, "0 worlds"),
+        (["linear"], 0, "worlds = 0"),
         (["liner"], 1, "did you mean 'linear'"),
     ],
 )
