@@ -37,6 +37,21 @@ def test_another_result_is_replaced_only_where_that_is_asked_for() -> None:
     assert Path("it/scenario.toml").read_text() == "seed = 2\n"
 
 
+def test_a_result_comes_back_if_its_successor_cannot_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    save(a="1")
+    rename = Path.rename
+
+    def fail(path: Path, place: Path) -> Path:
+        if path.name.endswith("part"):
+            raise OSError(28, "No space left on device")
+        return rename(path, place)
+
+    monkeypatch.setattr(Path, "rename", fail)
+    with pytest.raises(InputError, match="No space"):
+        save(a="2")
+    assert Path("it/a.json").read_text() == "1\n"
+
+
 def users_file() -> None:
     write("mine", "it/notes")
 

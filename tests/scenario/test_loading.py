@@ -90,6 +90,11 @@ def test_another_observer_brings_its_own_parameters() -> None:
     assert load_scenario(file).with_observer("ltv").observer.parameters == {}
 
 
+def test_a_setting_mends_a_file_with_another_observer_too() -> None:
+    file = write("duration_s = 'x'\n[observer]\nkind = 'homogeneous'")
+    assert load_scenario(file, ["duration_s=2"], observer="ltv").duration_s == 2.0
+
+
 def test_what_does_not_fit_names_the_file_whenever_it_is_found() -> None:
     scenario = load_scenario(write("plant.timestep_s = 0.001\n[controller]\nrate_hz = 300"), ["seed=1"]).with_observer(
         "ltv"

@@ -239,7 +239,7 @@ def find_existing_axes(spec: mujoco.MjSpec, model: mujoco.MjModel, name: str) ->
     if missing:
         raise InputError(f"the robot has an axis already, and yet {missing[0]}")
     if not name:
-        raise InputError(f"the robot has an axis {names[0]!r} already: give the new one a name, such as --name pitch")
+        raise InputError("the robot has an axis already: give the new one a name, such as --name pitch")
     key, names_of = model.key(EQUILIBRIUM_KEY).id, axis_modules(model)
     axes = [find_axis(model, key, axis, names_of[axis]) for axis in names]
     modules = [module for axis in axes for module in axis.modules]
