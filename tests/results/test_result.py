@@ -137,5 +137,5 @@ def test_a_trajectory_of_an_earlier_version_is_named_so(metadata: Any, tmp_path:
         {b"cmg_mj": json.dumps(metadata).encode()}
     )
     pq.write_table(table, tmp_path / "old.parquet")
-    with pytest.raises(InputError, match="run its scenario.toml again"):
+    with pytest.raises(InputError, match="run its scenario"):
         Trajectory.load(tmp_path / "old.parquet")
