@@ -104,8 +104,8 @@ def test_the_top_is_small() -> None:
 
 
 def test_every_package_is_in_the_table_once() -> None:
-    assert len(ORDER) == 15
-    assert sorted(ORDER) == sorted({package_of(name) for name in modules()} - {""})
+    assert len(ORDER) == len(set(ORDER)) == 15
+    assert {package_of(name) for name in modules()} - {""} <= set(ORDER)  # a package of its own may be deleted
 
 
 @pytest.mark.parametrize("package", ORDER)
