@@ -105,11 +105,6 @@ def test_another_law_does_without_the_files_gains() -> None:
     assert (roll.kind, roll.gains, roll.rate_limit_rad_s) == ("lqg", None, 3.0)
 
 
-def test_replay_of_several_axes_is_refused_for_what_it_is(run_folder: Path, run_outcome: CommandOutcome) -> None:
-    assert run_outcome.status == 0, run_outcome
-    assert "about several axes (roll, pitch)" in cmg_mj("replay", str(run_folder)).complaint
-
-
 def test_the_rigs_figures_are_the_worst_of_its_axes(run_summary: dict[str, Any]) -> None:
     summary = run_summary
     axes = list(summary[AXES].values())
@@ -191,14 +186,10 @@ def test_a_rig_of_one_axis_without_a_name_has_none_to_speak_of(setting: str) -> 
 
 
 def test_what_takes_one_axis_says_so() -> None:
-    for arguments in (
-        ["export", "linear", "--scenario", "two_axes"],
-        ["tune", "two_axes", "--observer", "linear"],
-        ["run", "two_axes", "--driver", "board"],
+    with pytest.raises(
+        InputError, match=r"tilts about several axes \(roll, pitch\), and tuning takes one.*locked_axes"
     ):
-        complaint = cmg_mj(*arguments).complaint
-        assert "tilts about several axes (roll, pitch)" in complaint
-        assert "plant.locked_axes" in complaint
+        two_axes().require_single_axis("tuning")
 
 
 def test_in_a_loop_of_ones_own() -> None:

@@ -45,6 +45,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_axis_cut_out_of_a_run_of_two_is_refused(tmp_path: Path) -> None:
     experiment = prepare(load_scenario("two_axes", ["duration_s=0.1", "push=[]"]))
     trajectory = report_run(experiment, experiment.run()).trajectory
+    trajectory.save(tmp_path / "both.parquet")
+    assert "about several axes (roll, pitch)" in cmg_mj("replay", tmp_path / "both.parquet").complaint
     trajectory.along("pitch").save(tmp_path / "pitch.parquet")
     assert "tilts about several axes" in cmg_mj("replay", tmp_path / "pitch.parquet").complaint
 
