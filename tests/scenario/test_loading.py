@@ -16,7 +16,7 @@ from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scena
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.scenario.loading import Scenario
+from cmg_mj.scenario.schema import Scenario
 from tests.run_folders import write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -93,6 +93,10 @@ def test_another_observer_brings_its_own_parameters() -> None:
 def test_a_setting_mends_a_file_with_another_observer_too() -> None:
     file = write("duration_s = 'x'\n[observer]\nkind = 'homogeneous'")
     assert load_scenario(file, ["duration_s=2"], observer="ltv").duration_s == 2.0
+
+
+def test_a_study_may_leave_its_scenario_empty() -> None:
+    assert load_scenario(write("[sweep]\nworlds = 2"), fields={}).duration_s == Scenario().duration_s
 
 
 def test_what_does_not_fit_names_the_file_whenever_it_is_found() -> None:

@@ -268,9 +268,3 @@ def test_a_study_file_names_tracks_from_where_it_lies(folder: Path, monkeypatch:
     for more in ([], ["--vary", "pivot.0.file=ride.csv,walk.csv"]):
         outcome = cmg_mj("sweep", "there/study.toml", *more, "--dry-run")
         assert outcome.status == 0, outcome
-
-
-def test_a_study_may_leave_its_scenario_empty(tmp_path: Path) -> None:
-    file = tmp_path / "study.toml"
-    file.write_text('[sweep]\nworlds = 2\n[scenario]\n[vary]\n"plant.equilibrium_bias_deg" = [0, 1]', encoding="utf-8")
-    assert cmg_mj("sweep", file, "--dry-run").status == 0
