@@ -148,7 +148,7 @@ def repeatable(scenario: Scenario, experiments: Sequence[Experiment], worlds: in
     """
     same = [e for e in experiments if e.scenario.observer.kind == scenario.observer.kind]
     trimmed = [e for e in experiments if e.scenario.controller.bias_trim_s]
-    choice, *_ = *same, *trimmed, *experiments
+    choice = (same or trimmed or experiments)[0]
     settings = CompareSettings(observers=[e.scenario.observer.kind for e in experiments], worlds=worlds)
     changes = {"compare": settings, "controller": (trimmed or [choice])[0].scenario.controller}
     return replace(choice, scenario=choice.scenario.model_copy(update=changes))

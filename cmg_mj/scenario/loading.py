@@ -49,8 +49,8 @@ def load_scenario(
         names.append(setting.partition("=")[0].strip())
         override(fields, setting)
     # Of gains and lqr, the one that --set does not give goes; with another law both.
-    set_sections = {".".join(f"{field}.".split(".")[:2]) for field in names}
-    unset = [field for field in ("gains", "lqr") if f"controller.{field}" not in set_sections]
+    given = [f"{field}." for field in names]
+    unset = [name for name in ("gains", "lqr") if not any(f.startswith(f"controller.{name}.") for f in given)]
     if len(unset) == 1 or _kind_of(fields, "controller") != law:
         for field in unset:
             fields.get("controller", {}).pop(field, None)

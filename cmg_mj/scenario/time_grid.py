@@ -124,12 +124,12 @@ def _marked(scenario: Scenario) -> tuple[list[_GridTime], list[tuple[str, float,
     parts = {"": scenario, **{f"axes.{name}.": part for name, part in scenario.axis_scenarios.items()}}
     for prefix, part in parts.items():
         for field, number, mark in marked_values(part, (OnGrid, Held, Start)):
-            if not isinstance(mark, OnGrid):
-                others += [] if prefix else [(field, number, mark)]
-                continue
-            exact, text = _fraction(number), f"{number:g} {mark.unit}"
-            seconds, exact = (1.0 / number, 1 / exact) if mark.unit == "Hz" else (number, exact)
-            times.append(_GridTime(prefix + field, text, seconds, exact, mark.unit))
+            if isinstance(mark, OnGrid):
+                exact, text = _fraction(number), f"{number:g} {mark.unit}"
+                time = (1.0 / number, 1 / exact) if mark.unit == "Hz" else (number, exact)
+                times.append(_GridTime(prefix + field, text, *time, mark.unit))
+            elif not prefix:
+                others.append((field, number, mark))
         pair = part.sensors.accelerometer
         if pair.bandwidth_hz:
             field, period = f"{prefix}sensors.accelerometer.bandwidth_hz", 1.0 / pair.raw_rate_hz

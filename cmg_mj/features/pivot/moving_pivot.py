@@ -51,7 +51,7 @@ def moving_pivot(
     pivots: Sequence[Pivot], plants: Sequence[Plant], seed: int, world_ids: int | Sequence[int]
 ) -> PivotSignals:
     """Make the acceleration of the pivot as a disturbance; a size may be an array (n_worlds,)."""
-    directions, *_ = [pivot_directions(plant, pivots) for plant in dict.fromkeys(plants)]
+    directions, *_ = [pivot_directions(plant, pivots) for plant in dict.fromkeys(plants)]  # each plant is checked
     return PivotSignals(pivots, directions, seed, world_ids, plants[0].timestep)
 
 
