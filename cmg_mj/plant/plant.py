@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -32,14 +32,15 @@ from cmg_mj.plant.mjcf import compile_model, parse, quiet, set_control_callback
 from cmg_mj.plant.settings import apply, place_accelerometers
 from cmg_mj.plant.step_limit import fit_step
 from cmg_mj.plant.tilt_line import HingeLine
-from cmg_mj.plant.turning import turning
 from cmg_mj.scenario.design import PlantNumbers
 from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import Scenario
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
-from cmg_mj.stages.turning import YawCoupling
+
+if TYPE_CHECKING:
+    from cmg_mj.stages.turning import YawCoupling
 
 FIRST_S = 0.02
 """Simulated time of the trial of the physics, in 4 to 100 steps [s]."""
@@ -162,6 +163,8 @@ class Plant:
     @cached_property
     def turning(self) -> YawCoupling:
         """Coupling of the axes in a turn about the vertical."""
+        from cmg_mj.plant.turning import turning  # most rigs have one axis
+
         return turning(self.filed.model, self.key, self.axes)
 
     @property

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.results.intervals import finite_values
 from cmg_mj.results.summary_keys import NESTED, Summary, as_table, open_loop_figures
 from cmg_mj.results.trajectory import NamedColumns, Trajectory, frame_of
 
@@ -115,8 +114,8 @@ class Result(NamedColumns):
 
     def mean(self, key: str, estimator: str | None = None) -> float | None:
         """Return the mean of `values` over the worlds that have one; None if no world has."""
-        known = finite_values(self.values(key, estimator))
-        return statistics.fmean(known) if len(known) else None
+        known = [value for value in self.values(key, estimator) if math.isfinite(value)]
+        return statistics.fmean(known) if known else None
 
     @property
     def _open_loop_names(self) -> list[str]:
