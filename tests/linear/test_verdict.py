@@ -79,14 +79,10 @@ def tilts(h: float, seconds: float, period: float, latency: float = 0.0) -> np.n
 
 
 @pytest.mark.daily_cases("0.08-False", "0.1-True")
-@pytest.mark.parametrize(("period", "refused"), [(1.0, True), (0.1, True), (0.08, False)])
-def test_a_period_at_which_the_loop_is_unstable_is_not_exported(period: float, refused: bool) -> None:
+@pytest.mark.parametrize(("period", "unstable"), [(1.0, True), (0.1, True), (0.08, False)])
+def test_a_period_at_which_the_loop_is_unstable(period: float, unstable: bool) -> None:
     grown = np.abs(tilts(5e-4, 40.0 * period, period)[:: round(period / 5e-4)])
-    assert bool(not grown[-1] <= grown[10]) is refused
-    outcome = cmg_mj("export", "linear", "--set", f"controller.rate_hz={1.0 / period}", "--out", "x")
-    assert outcome.status == (2 if refused else 0)
-    assert ("more than 10.2 Hz are needed" in outcome.err) is refused
-    assert Path("x").exists() is not refused
+    assert bool(not grown[-1] <= grown[10]) is unstable
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import export, generate_code
+from tests.command import cmg_mj
 from tests.features.export import own, own_laws
 from tests.features.export.compiled import controller
 
@@ -109,3 +110,13 @@ def test_a_stage_that_c_does_not_have_is_refused_by_name() -> None:
     humming = Controller(plain.observer, plain.law, plain.sensors, plain.plant, commands=[Hum])
     with pytest.raises(InputError, match=r"^Hum: "):
         generate_code(humming, "double")
+
+
+@pytest.mark.usefixtures("elsewhere")
+@pytest.mark.parametrize(("rate", "refused"), [(10.0, True), (12.5, False)])
+def test_a_rate_at_which_the_loop_is_unstable_is_refused(rate: float, refused: bool) -> None:
+    """See `test_a_period_at_which_the_loop_is_unstable`: the border lies between."""
+    outcome = cmg_mj("export", "linear", "--set", f"controller.rate_hz={rate}", "--out", "x")
+    assert outcome.status == (2 if refused else 0)
+    assert ("more than 10.2 Hz are needed" in outcome.err) is refused
+    assert Path("x").exists() is not refused
