@@ -48,7 +48,7 @@ def experiment(*settings: str, observer: str = "gyro_free") -> Experiment:
 
 
 def gyro_rates(setup: Experiment, t: Trajectory, late_s: float = 0.0, **changed: float) -> dict[str, np.ndarray]:
-    """Rates of a gyro with other errors, and later, in a run; the rig does not turn, so the tilt rate is the frame's."""
+    """Rates of a gyro with other errors, and late. The rig does not turn, so the tilt rate is the frame's."""
     dt, _, noise = setup.design.constructor_arguments
     gyro, rate, y1 = setup.scenario.sensors.mems_gyro, t["x2_rad_s"], t["y1_rad"]
     before = np.vstack([rate[:1], rate[:-1]])

@@ -9,9 +9,9 @@ way by h x2/kp, on the bundled rig 4 mrad per rad/s; a count of its encoder is 1
 and the command, so that it knows the gimbal's angle to a part of a count, and each count tells on which side of an edge
 the angle is. Parts:
 
-- loop: the filter beside others, by the encoders' counts, and where the pivot moves; `floor_all`, the least error of a
-  *linear* filter of the same signals to which y2 is white noise. The interval of a count says more than its variance:
-  the filter is below that floor.
+- loop: the filter beside others, by the encoders' counts, and where the pivot moves (the filter is told how strongly);
+  `floor_all`, the least error of a *linear* filter of the same signals, to which y2 is white noise. The interval of a
+  count says more than its variance: the filter is below that floor.
 - friction: dry friction of the gimbals, which the filter does not know, or whose size it is told.
 - wrong: a wrong model, servo or momentum.
 """
@@ -30,7 +30,9 @@ from scipy.special import log_ndtr
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
-from cmg_mj.core.types import Estimate, Measurement
+from cmg_mj.core.types import STANDARD_GRAVITY, Estimate, Measurement
+from cmg_mj.observers.gyro_free import GyroFree
+from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
@@ -40,6 +42,12 @@ TILT, RATE, GIMBAL, TURN, TORQUE, OFFSET, DRAG, PIVOT, SWAY = range(9)
 torque on a gimbal; the pivot's share of y1 and its rate."""
 NUDGE = 1e-6
 """Of each part of the state, for slopes."""
+W = 2.0 * math.pi * 5.0
+"""Corner of the pivot's motion, and of the torque on a gimbal [rad/s]."""
+TORQUE_START, TORQUE_WALK = 0.2, 0.01
+"""Standard deviation of the torque on the rig at the start, and of its change in a second [N m]."""
+GATE = 3.0
+"""Standard deviations of the acceleration from what is expected, beyond which it is a push."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +55,8 @@ class GimbalGyro:
     """An extended Kalman filter of y1, the acceleration, y2 and u, with the servo in its model.
 
     A count of y2 says in which interval x3 is: the estimate becomes the mean of the normal distribution cut to it. A
-    push is found by the acceleration: if its surprise e exceeds `gate` standard deviations, the torque may have changed
-    by as much (its variance grows by e^2 less what was expected).
+    push is found by the acceleration: if this is off by more than `GATE` allows, the torque may have changed by as much
+    (its variance grows by the square of that, less what was expected).
 
     Attributes:
         dt: Sample period, and the physics step: the model takes the same RK4 step [s].
@@ -59,13 +67,8 @@ class GimbalGyro:
         count: Of the encoder [rad].
         y2: `interval`, `white` noise, or `blind` to it.
         drag: Standard deviation of the torque on a gimbal that the model lacks, such as friction [N m].
-        drag_hz: Its corner.
         pivot: Standard deviation of the pivot's acceleration over g.
-        pivot_hz: Its corner.
-        torque_start, torque_walk: Standard deviation of the torque at the start, and of its change in a second [N m].
-        offset_start: Standard deviation of the acceleration's offset at the start [rad/s^2].
         tilt_inertia, momentum: Factors on the model's J1 and h, to make the filter wrong.
-        gate: See above.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("model", "gimbals", "acceleration")
@@ -79,22 +82,16 @@ class GimbalGyro:
     count: float = 2.0 * math.pi / 4096.0
     y2: str = "interval"
     drag: float = 0.0
-    drag_hz: float = 5.0
     pivot: float = 0.0
-    pivot_hz: float = 5.0
-    torque_start: float = 0.2
-    torque_walk: float = 0.01
-    offset_start: float = 0.35
     tilt_inertia: float = 1.0
     momentum: float = 1.0
-    gate: float = 3.0
 
     def init(self, y: Measurement) -> Any:
         """Start at rest at the measured tilt, the gimbals where their encoders show them, as the servos do."""
         zero = 0.0 * np.asarray(y.y1)
         x = np.stack([y.y1 + zero, zero, y.y2 + zero, *[zero] * 6], axis=-1)
-        sway = 2.0 * math.pi * self.pivot_hz * self.pivot
-        known = [self.noise.tilt, 0.02, 1e-6, 1e-6, self.torque_start, self.offset_start, self.drag, self.pivot, sway]
+        offset = GyroFree.bias_start
+        known = [self.noise.tilt, 0.02, 1e-6, 1e-6, TORQUE_START, offset, self.drag, self.pivot, W * self.pivot]
         return x, np.diag(np.square(known)) + zero[..., None, None], y.y2 + zero
 
     def step(self, state: Any, y: Measurement, u: Any) -> tuple[Any, Estimate]:
@@ -116,11 +113,9 @@ class GimbalGyro:
         tilting = m.gravity_torque * np.sin(x1 - pivot) + torque / m.gimbals + turn * c * (h - 2.0 * m.J2 * s * x2)
         servo = self.stiffness * (setpoint - x3) - self.damping * turn
         turning = servo - c * x2 * (h - m.J2 * s * x2) + drag
-        w = 2.0 * math.pi * self.pivot_hz
-        forgets = -2.0 * math.pi * self.drag_hz * drag
-        swaying = -w * w * pivot - math.sqrt(2.0) * w * sway
+        swaying = -W * W * pivot - math.sqrt(2.0) * W * sway
         zero = 0.0 * offset
-        return np.stack([x2, tilting / D, turn, turning / self.inertia, zero, zero, forgets, sway, swaying], axis=-1)
+        return np.stack([x2, tilting / D, turn, turning / self.inertia, zero, zero, -W * drag, sway, swaying], axis=-1)
 
     def moved(self, x: np.ndarray, setpoint: Any, u: Any) -> np.ndarray:
         """Return x a sample period later, by the step of the physics."""
@@ -133,12 +128,10 @@ class GimbalGyro:
 
     def _predicted(self, x: np.ndarray, P: np.ndarray, setpoint: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
         x, F = _slopes(self.moved(_nudged(x), setpoint, u))
-        w = 2.0 * math.pi * self.pivot_hz
         white = np.zeros(9)
         white[TURN] = 1e-3  # keeps x3 uncertain by a thousandth of a count
-        white[TORQUE], white[OFFSET] = self.torque_walk, 0.01
-        white[DRAG] = self.drag * math.sqrt(4.0 * math.pi * self.drag_hz)
-        white[SWAY] = self.pivot * math.sqrt(math.sqrt(8.0) * w**3)
+        white[TORQUE], white[OFFSET] = TORQUE_WALK, GyroFree.bias_walk
+        white[DRAG], white[SWAY] = self.drag * math.sqrt(2.0 * W), self.pivot * math.sqrt(math.sqrt(8.0) * W**3)
         return x, F @ P @ np.swapaxes(F, -1, -2) + np.diag(np.square(white)) * self.dt
 
     def _by_accelerometers(
@@ -149,7 +142,7 @@ class GimbalGyro:
         e, e1 = y.acceleration - expected[..., 0], y.y1 - expected[..., 1]
         ee = np.einsum("...i,...ij,...j", C, P, C) + n.acceleration**2
         P = P.copy()
-        P[..., TORQUE, TORQUE] += np.where(e * e > self.gate**2 * ee, e * e - ee, 0.0) / C[..., TORQUE] ** 2
+        P[..., TORQUE, TORQUE] += np.where(e * e > GATE**2 * ee, e * e - ee, 0.0) / C[..., TORQUE] ** 2
         before, share = x, n.correlation * n.tilt / n.acceleration
         x, P = _corrected(x, P, C, e, n.acceleration**2)
         C1 = C1 - share * C
@@ -221,7 +214,7 @@ def floor_all(of: GimbalGyro) -> float:
 
 OURS = "gimbal_gyro:GimbalGyro"
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
-HEADINGS = ["", "in the loop", "error [rad/s]", "in push window [rad/s]", "fell"]
+HEADINGS = ["", "in the loop", "error [rad/s]", "in push window [rad/s]", "zero [rad/s]", "fell"]
 
 
 def experiment(observer: str, *settings: str) -> Experiment:
@@ -232,9 +225,11 @@ def experiment(observer: str, *settings: str) -> Experiment:
 def row(label: str, observer: str, worlds: int, *settings: str) -> list[str]:
     """Run worlds; return a row of a table."""
     result = experiment(observer, *settings).run_many(worlds, keep_trajectory=False)
-    errors = [result.mean(key) for key in ERRORS]
     stood = int(result.stood.sum())
-    figures = ["-" if error is None else f"{error:.4f}" for error in errors]
+    ends = [mean_interval(result.values(key)[result.stood]) if stood > 1 else None for key in ERRORS]
+    figures = ["-" if end is None else f"{end.mean:.4f} ± {end.half:.4f}" for end in ends]
+    zero = result.mean(ERRORS[0], "zero")
+    figures.append("-" if zero is None else f"{zero:.4f}")
     said = [setting.removeprefix("observer.") for setting in settings if setting.startswith("observer.")]
     return [label, ", ".join([observer.removeprefix("gimbal_gyro:"), *said]), *figures, f"{worlds - stood} of {worlds}"]
 
@@ -250,12 +245,12 @@ def loop(worlds: int) -> None:
     rows += [row("as it is", OURS, worlds, f'observer.y2="{kind}"') for kind in ("white", "blind")]
     for counts in (4096, 16384, 65536):
         count = 2.0 * math.pi / counts
-        finer = f"sensors.encoder.counts_per_revolution={counts}", f"observer.count={count!r}"
+        finer = f"sensors.encoder.counts_per_revolution={counts}", f"observer.count={count:.4g}"
         rows.append(row(f"{counts} counts", OURS, worlds, *finer))
         least = floor_all(GimbalGyro(*experiment("gyro_free").design.constructor_arguments, count=count))
-        rows.append([f"{counts} counts", "`floor_all`", f"{least:.4f}", f"{least:.4f}", "-"])
+        rows.append([f"{counts} counts", "`floor_all`", f"{least:.4f}", f"{least:.4f}", "-", "-"])
     moving = 'pivot=[{kind="noise", acceleration_m_s2=0.5, corner_hz=5.0}]'
-    told = f"observer.pivot={0.5 / 9.81:.4f}"
+    told = f"observer.pivot={0.5 / STANDARD_GRAVITY:.4f}"
     rows += [row("pivot 0.5 m/s2 to 5 Hz", name, worlds, moving) for name in ("gyro_free", "free_pivot")]
     rows.append(row("pivot 0.5 m/s2 to 5 Hz", OURS, worlds, moving, told))
     show("The filter beside others", rows)

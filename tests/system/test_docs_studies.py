@@ -22,6 +22,7 @@ REAL_RIGS = ("real_bend", "real_pivot", "real_rigs", "real_vibration")
     [
         "baselines.py --worlds 2",
         "for_a_builder.py --worlds 2 --observers linear,gyro_free",
+        "gimbal_gyro.py --worlds 2 --parts loop",
         "free_pivot_tuning.py --worlds 2 --falls 2 --jobs 1",
         "gyro_free.py --worlds 2 --noise 400 --e 0.5 --parts model,taps",
         "gyro_free_against.py --worlds 2 --jobs 1 --only 'mast of 10 Hz'",
