@@ -92,7 +92,7 @@ EXAMPLES = {
     "plant.locked_axes": '["pitch"]',
     "plant.turn_rate_rad_s": "1.0",
     "plant.gimbal_armature_kg_m2": "0.002",
-    "plant.gimbal_friction_n_m": "0.05",
+    "plant.gimbal_friction_n_m": "0.1",
     "plant.gimbal_damping_n_m_s": "0.01",
     "plant.gimbal_backlash_arcmin": "20.0",
     "plant.servo_stiffness_n_m_rad": "50.0",

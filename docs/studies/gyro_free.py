@@ -15,7 +15,8 @@ world by world. Means over the worlds; intervals are of 95 %. The parts:
 - start: what `bias_start` is worth: the error by the floor, with parts that are offset or a degree off by its own error
   without, and the falls at the largest e with 5 mg on the inner accelerometer.
 - limits: the e at which half of 20 worlds fall, in steps of 1/16 degree.
-- model: what a filter could gain that knows the model, the command, the push and e: two floors.
+- model: what a filter of y1 and the acceleration alone could gain that knows the model, the gimbals' motion, the push
+  and e: two floors. A filter that takes y2 for a sensor of the rate is below both (`gimbal_gyro.py`).
 - taps: the floor of y1 alone by taps and memory, and the same fit with the acceleration beside it.
 """
 
@@ -239,9 +240,9 @@ def model(noises: Sequence[float]) -> None:
         known = velocity_floor(reduced, dt, said.tilt)
         rows.append([f"{noise:g}", f"{free:.5f}", f"{known:.5f}", f"{100.0 * (1.0 - known / free):.1f} %"])
     print(
-        "\nThe floor of y1 and its acceleration for any motion, and the floor with model, command, push and e known, to"
+        "\nThe floor of y1 and its acceleration for any motion, and that of y1 with model, push, e and the gimbals' motion"
     )
-    print("to which the measured acceleration adds nothing [rad/s]: so much can a model take off at most.\n")
+    print("known [rad/s]. So much a model takes off where y2 tells nothing of the rate (see gimbal_gyro.py).\n")
     print(markdown_table(["ug/rtHz", "any motion", "all known", "less"], rows), flush=True)
 
 

@@ -62,7 +62,7 @@ def test_gyro_free_is_several_times_nearer_than_the_best_of_y1_y2_and_u() -> Non
 @pytest.mark.parametrize(("ug", "printed", "over_fused"), [(400, 0.0149, 7.2), (100, 0.0045, 2.7), (70, 0.0035, 2.2)])
 def test_gyro_free_with_parts_of_three_generations(ug: int, printed: float, over_fused: float) -> None:
     """docs/results.md, on other seeds: the errors, and their ratios to the fused gyro of an MPU-6050."""
-    result = closed_loop("gyro_free", (f"sensors.accelerometer.noise_density_ug_rthz={ug}.0",), SEED, 100)
+    result = closed_loop("gyro_free", (f"sensors.accelerometer.noise_density_ug_rthz={ug}.0",), SEED, 40)
     errors, fused = result.values(ERROR), result.values(ERROR, "mems_fused")
     assert abs(errors.mean() - printed) < 0.05 * printed
     assert abs(errors.mean() / fused.mean() - over_fused) < 0.1 * over_fused

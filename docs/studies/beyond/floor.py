@@ -1,4 +1,4 @@
-"""The floor under every observer's velocity error: the filter that knows model and noise statistics exactly."""
+"""The floor of the velocity error from y1: the filter that knows all else, but takes no rate from the gimbals."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def kalman_filter(model: ReducedModel, dt: float, sigma: float) -> tuple[np.ndar
 
 
 def velocity_floor(model: ReducedModel, dt: float, sigma: float) -> float:
-    """Return the RMS velocity error of that filter [rad/s]; no unbiased estimate from the same samples is better."""
+    """Return the RMS velocity error of that filter [rad/s]; no unbiased estimate from y1 is better."""
     return math.sqrt(kalman_filter(model, dt, sigma)[2][1, 1])
