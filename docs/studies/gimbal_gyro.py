@@ -32,6 +32,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STANDARD_GRAVITY, Estimate, Measurement
 from cmg_mj.observers.gyro_free import GyroFree
+from cmg_mj.results.floors import acceleration_floor
 from cmg_mj.results.intervals import mean_interval
 from cmg_mj.results.tables import markdown_table
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -243,12 +244,14 @@ def loop(worlds: int) -> None:
     """Print the filter beside others, by counts, and where the pivot moves."""
     rows = [row("as it is", name, worlds) for name in ("gyro_free", OURS)]
     rows += [row("as it is", OURS, worlds, f'observer.y2="{kind}"') for kind in ("white", "blind")]
+    dt, model, noise = experiment("gyro_free").design.constructor_arguments
+    bounds = [("any counts", "floor_accel", acceleration_floor(noise, dt))]
     for counts in (4096, 16384, 65536):
-        count = 2.0 * math.pi / counts
+        label, count = f"{counts} counts", 2.0 * math.pi / counts
         finer = f"sensors.encoder.counts_per_revolution={counts}", f"observer.count={count:.4g}"
-        rows.append(row(f"{counts} counts", OURS, worlds, *finer))
-        least = floor_all(GimbalGyro(*experiment("gyro_free").design.constructor_arguments, count=count))
-        rows.append([f"{counts} counts", "`floor_all`", f"{least:.4f}", f"{least:.4f}", "-", "-"])
+        rows.append(row(label, OURS, worlds, *finer))
+        bounds.append((label, "floor_all", floor_all(GimbalGyro(dt, model, noise, count=count))))
+    rows += [[label, f"`{name}`", f"{least:.4f}", *3 * "-"] for label, name, least in bounds]
     moving = 'pivot=[{kind="noise", acceleration_m_s2=0.5, corner_hz=5.0}]'
     told = f"observer.pivot={0.5 / STANDARD_GRAVITY:.4f}"
     rows += [row("pivot 0.5 m/s2 to 5 Hz", name, worlds, moving) for name in ("gyro_free", "free_pivot")]

@@ -239,10 +239,8 @@ def model(noises: Sequence[float]) -> None:
         free = of.run_many(1, keep_trajectory=False).mean(ERROR, "floor_accel") or math.nan
         known = velocity_floor(reduced, dt, said.tilt)
         rows.append([f"{noise:g}", f"{free:.5f}", f"{known:.5f}", f"{100.0 * (1.0 - known / free):.1f} %"])
-    print(
-        "\nThe floor of y1 and its acceleration for any motion, and that of y1 with model, push, e and the gimbals' motion"
-    )
-    print("known [rad/s]. So much a model takes off where y2 tells nothing of the rate (see gimbal_gyro.py).\n")
+    print("\nThe floor of y1 and its acceleration for any motion, and that of y1 with model, push, e and the gimbals'")
+    print("motion known [rad/s]. So much a model takes off where y2 tells nothing of the rate (see gimbal_gyro.py).\n")
     print(markdown_table(["ug/rtHz", "any motion", "all known", "less"], rows), flush=True)
 
 
