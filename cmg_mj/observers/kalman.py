@@ -107,7 +107,7 @@ class Kalman:
     noise: MeasurementNoise
     torque_walk: Positive = 0.03
     torque_white: Positive = 0.082
-    gimbal_white: Positive = 0.017
+    gimbal_white: Positive = 0.024
     rate_start: Positive = 0.1
     torque_start: Positive = 0.2
 

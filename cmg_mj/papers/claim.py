@@ -48,6 +48,7 @@ class Claim:
         statement: Statement of the paper there, in our words.
         holds: True if the figures confirm the claim, computed from them; or such a value for each of several
             measures, all of which must hold.
+        one_suffices: Whether the measures are settings that the paper leaves open, of which one must hold.
         assumes: Assumptions of ours, which the paper does not print and the claim depends on, such as `push`, `noise`
             or `method`, each with its size in a few words.
         is_general: Whether the statement is a general one, which was tried on some systems and not proved.
@@ -63,6 +64,7 @@ class Claim:
     place: str
     statement: str
     holds: bool | np.bool_ | Mapping[str, bool]
+    one_suffices: bool = False
     assumes: Mapping[str, str] = field(default_factory=dict)
     is_general: bool = False
     missing_data: str = ""
@@ -76,7 +78,8 @@ class Claim:
     def __post_init__(self) -> None:
         measures = self.holds if isinstance(self.holds, Mapping) else {}
         object.__setattr__(self, "measures", {name: bool(value) for name, value in measures.items()})
-        object.__setattr__(self, "holds", all(measures.values()) if measures else bool(self.holds))
+        judge = any if self.one_suffices else all
+        object.__setattr__(self, "holds", judge(measures.values()) if measures else bool(self.holds))
         object.__setattr__(self, "figures", plain(self.figures))
 
     @property

@@ -1,4 +1,4 @@
-"""Readings and pictures of recorded runs that several papers need, and a step of Runge and Kutta."""
+"""Runs, readings and pictures of them that several papers need, and a step of Runge and Kutta."""
 
 from __future__ import annotations
 
@@ -11,7 +11,29 @@ import numpy as np
 from cmg_mj.papers.claim import Array, Claim
 from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.runs.experiment import Experiment
+from cmg_mj.runs.side_by_side import BatchJob, run_jobs
 from cmg_mj.view.plots.figure import Line, Panel, Picture
+
+
+def run_settings(
+    experiments: Sequence[Experiment], values: Mapping[str, Sequence[float]], worlds: int, keep_trajectory: bool = True
+) -> list[list[Result]]:
+    """Run the same worlds of every experiment at several settings.
+
+    Args:
+        experiments: The experiments.
+        values: Field -> its value at each setting.
+        worlds: Worlds a setting, with the same noise at each and for every experiment.
+        keep_trajectory: Whether to record them.
+
+    Returns:
+        For each experiment a result a setting.
+    """
+    varied = {field: np.repeat(of, worlds) for field, of in values.items()}
+    settings = len(next(iter(values.values())))
+    jobs = [BatchJob(experiment.with_varied(varied), [*range(worlds)] * settings) for experiment in experiments]
+    return [result.split(settings) for result in run_jobs(jobs, keep_trajectory=keep_trajectory)]
 
 
 def trajectory_of(result: Result) -> Trajectory:

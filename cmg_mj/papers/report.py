@@ -98,8 +98,9 @@ def report_text(entries: Sequence[Reproduction]) -> str:
     parts = [
         "# The papers, claim by claim",
         "One rule computes a verdict from the claim's figures and from the assumptions that it declares. No parameter "
-        "was tuned to bring a verdict about. If a claim has several measures, all must hold. docs/assumptions.md lists "
-        "the assumptions about the rig that every claim shares.",
+        "was tuned to bring a verdict about. If a claim has several measures, all must hold; if a paper leaves open "
+        "what its statement depends on, such as the push, one of the settings tried must do. docs/assumptions.md "
+        "lists the assumptions about the rig that every claim shares.",
         "\n".join(f"- *{verdict}*: {meaning}." for verdict, meaning in VERDICTS.items()),
     ]
     claims = [claim for entry in entries for claim in entry.claims]

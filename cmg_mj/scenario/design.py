@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -175,9 +174,13 @@ class PlantNumbers(NamedTuple):
     hints: tuple[str, ...]
 
     def noise(self, sensors: Sensors) -> MeasurementNoise:
-        """Return the noise of tilt, angular acceleration and y2, the mean of as many encoders as there are gimbals."""
-        gimbal = sensors.encoder.sample_sigma / math.sqrt(self.reduced.gimbals)
-        return replace(self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity), gimbal=gimbal)
+        """Return the noise of tilt, angular acceleration and y2.
+
+        The gimbals of an axis mirror each other about upright, so their encoders round alike and y2 has the noise of
+        one. Only while the plant turns about the vertical do the gimbals differ, and their mean has less.
+        """
+        noise = self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity)
+        return replace(noise, gimbal=sensors.encoder.sample_sigma)
 
 
 class StageOptions(TypedDict, total=False):

@@ -224,7 +224,7 @@ def test_cause_of_a_bias_is_judged_by_what_is_left_without_it(runs: Study) -> No
     partly = "reproduced within stated conditions"
     assert figures.bias_of_constant_gain(runs._replace(exact=gone)).verdict == partly
     claim = figures.bias_of_updated_gains(runs._replace(exact=runs.nominal))
-    assert (claim.verdict, claim.reason) == ("not reproduced", "Half of it or more remains in every window.")
+    assert (claim.verdict, any(claim.measures.values())) == ("not reproduced", False)
 
 
 def test_the_cause_of_a_bias_must_be_so_in_every_window(runs: Study, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,11 +233,9 @@ def test_the_cause_of_a_bias_must_be_so_in_every_window(runs: Study, monkeypatch
     partly = "reproduced within stated conditions"
     assert [figures.bias_of_constant_gain(runs).verdict, figures.bias_of_updated_gains(runs).verdict] == [partly] * 2
     shares[:, 3] = 0.7
-    claims = [figures.bias_of_constant_gain(runs), figures.bias_of_updated_gains(runs)]
-    for claim in claims:
+    for claim in (figures.bias_of_constant_gain(runs), figures.bias_of_updated_gains(runs)):
         assert claim.verdict == "not reproduced"
         assert list(claim.measures.values()) == [True, True, True, False]
-    assert "not in t = 42 to 50" in claims[1].reason
 
 
 def test_order_of_figure_2_is_needed_in_nearly_every_seed(runs: Study) -> None:

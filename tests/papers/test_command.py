@@ -152,12 +152,14 @@ def test_wrong_input() -> None:
 def test_one_rule_decides(declared: dict[str, Any], holding: str, failing: str) -> None:
     """By what a claim is declared to depend on and by what was found; no verdict is there whatever was found."""
 
-    def verdict(holds: bool | dict[str, bool]) -> str:
-        return Claim("Fig. 9", "it is so", holds=holds, **declared).verdict
+    def verdict(holds: bool | dict[str, bool], *, one_suffices: bool = False) -> str:
+        return Claim("Fig. 9", "it is so", holds=holds, one_suffices=one_suffices, **declared).verdict
 
     assert (verdict(True), verdict(False)) == (holding, failing)
     assert verdict({"tilt": True, "rate": True}) == holding
     assert verdict({"tilt": True, "rate": False}) == failing  # all measures must hold
+    assert verdict({"1 N m": True, "2 N m": False}, one_suffices=True) == holding  # one of the settings must
+    assert verdict({"1 N m": False, "2 N m": False}, one_suffices=True) == failing
 
 
 # --- without the packages of the extra [papers] ---------------------------------------------------------------

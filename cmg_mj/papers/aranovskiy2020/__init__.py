@@ -31,7 +31,7 @@ SECTIONS = [
     section("Remark 1, the Riccati equation", 1.0, riccati.delicacy),
     section("the Riccati equation as printed", 1.0, riccati.misprint),
     section("Fig. 4", 3.0, section_5.figure_4),
-    section("Figs 5 to 7", 8.0, section_5.claims),
+    section("Figs 5 to 7", 14.0, section_5.claims),
     section("the time-invariant observer", 9.0, section_5.remark),
     Section("Table 2 tuned again", 60.0, table_2.claims),
     section("the appendix", 3.0, lambda: plvcc.claim("aranovskiy2020")),

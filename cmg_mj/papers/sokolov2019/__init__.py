@@ -12,6 +12,6 @@ SECTIONS = [
     section("Proposition 1", 1.3, lambda: plvcc.claim("sokolov2019")),
     section("Fig. 3", 0.8, figure_3.claims),
     Section("Table II", 12.0, figure_3.tuning_claims),
-    section("Figs 4 to 6, and the lag", 10.0, section_5.claims),
+    section("Figs 4 to 6, and the lag", 12.0, section_5.claims),
     section("the thrust bearing", 3.0, lambda: bearing.claim(bearing.study())),
 ]

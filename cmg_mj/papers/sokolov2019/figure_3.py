@@ -134,7 +134,9 @@ def ignores_y2(tuning: Tuning, relative: Mapping[str, Interval]) -> Claim:
         "(9) ignores y2 completely, and thus is not robust against external disturbances.",
         assumes=ASSUMED,
         holds={"y2 is ignored": reach == 0.0, "the push is missed for this reason": with_y2.high < 1.0},
-        otherwise="(9) does ignore y2, but does not miss the push for this reason: with y2 it misses the push as well.",
+        otherwise="(9) does ignore y2, but does not miss the push for this reason: with y2 it misses the push as well. "
+        "So it is with pushes of 0.1 to 1 N m, e from -0.25 to 1 deg, and without noise: y2 takes away at most 11 % of "
+        "the error.",
         figures={
             "effect_of_y2_rad_s": reach,
             "relative_error_with_y2": with_y2,
