@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.types import Estimate, FeedbackState, Measurement, State, feedback_state
+from cmg_mj.core.types import Estimate, FeedbackState, Measurement, feedback_state
 
 WORLDS, SAMPLES = 3, 100
 """Worlds and samples of the trial that shows whether an observer or a law takes arrays."""

@@ -15,9 +15,10 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, PushLimits, PushMargin, ceiling, push_limits
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, PushLimits, PushMargin, push_limits
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
 from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
