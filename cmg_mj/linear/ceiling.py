@@ -66,3 +66,24 @@ def ceiling(model: ReducedModel, rate_limit: float, travel: float = math.pi / 2.
     S = u / (pole**2 + u**2) * (1.0 + left * (u / pole * math.sin(travel) - math.cos(travel)))
     tilt = momentum / model.J1 * S
     return RecoverableLimit(tilt, model.gimbals * model.J1 * pole * tilt, pole)
+
+
+PUSH_S = 0.1
+"""Duration of the push that the words name [s]."""
+
+
+def plant_words(model: ReducedModel) -> str:
+    """Say for one line what a plant is about its tilt line, all its gimbals together."""
+    n = model.gimbals
+    return (
+        f"inertia {n * model.J1:.4g} kg m^2, gravity {n * model.gravity_torque:.4g} N m, momentum "
+        f"{n * model.J_d * model.omega_d:.4g} N m s, falls with {math.sqrt(model.gravity_torque / model.J1):.3g} 1/s"
+    )
+
+
+def ceiling_words(limit: RecoverableLimit) -> str:
+    """Say for one line what any controller recovers from."""
+    return (
+        f"any controller, from upright gimbals (linear model): recovers from at most {math.degrees(limit.tilt):.3g} "
+        f"deg, or a push of {limit.push_impulse(PUSH_S) / PUSH_S:.3g} N m for {PUSH_S:g} s"
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hu
 from cmg_mj.core.types import Law
 from cmg_mj.inputs.features import FEATURES
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
 from cmg_mj.linear.plant import linear_reduced, linearise
 from cmg_mj.plant.plant import Plant
@@ -213,8 +215,21 @@ def hints(design: Design, plant: Plant) -> list[str]:
     # Margin that a notch against a bend takes is no fault.
     is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
-    others = fault, _sliding_hint(scenario, law, plant)
+    others = *_ceiling_hints(design), fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
+
+
+def _ceiling_hints(design: Design) -> Iterator[str]:
+    """Name the first tilt and the pushes from which no controller recovers."""
+    scenario, limit = design.scenario, ceiling(design.rig.reduced, design.law.rate_limit)
+    most = math.degrees(limit.tilt)
+    beyond = "no controller recovers from more than {:.3g} {}on this plant; a larger pair or a lighter plant does"
+    if abs(start := scenario.plant.initial_tilt_deg) > most:
+        yield f"plant.initial_tilt_deg = {start:g}: {beyond.format(most, 'deg ')}"
+    for i, push in enumerate(scenario.push):
+        most = limit.push_impulse(push.duration_s) / push.duration_s
+        if abs(push.torque_n_m) > most:
+            yield f"push.{i}.torque_n_m = {push.torque_n_m:g}: {beyond.format(most, f'N m for {push.duration_s:g} s ')}"
 
 
 STANDS_STILL = 1e-6

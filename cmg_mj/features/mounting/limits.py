@@ -17,7 +17,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.mounting.stance import simulated_pole
-from cmg_mj.linear.ceiling import RecoverableLimit, ceiling
+from cmg_mj.linear.ceiling import PUSH_S, RecoverableLimit, ceiling
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
@@ -30,7 +30,6 @@ from cmg_mj.stages.push import Push, Pushes
 WORLDS = 10
 LEVELS = 24
 """Pushes tried at once, and then as many between the largest tolerated one and the next."""
-PUSH_S = 0.1
 BEFORE_S = 1.0
 """The loop runs for so long before the push comes [s]."""
 AFTER_TIME_CONSTANTS = 10.0
