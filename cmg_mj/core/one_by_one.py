@@ -6,15 +6,13 @@ import copy
 import functools
 import logging
 import math
-import warnings
-from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.types import Estimate, FeedbackState, Measurement, feedback_state
+from cmg_mj.core.types import Measurement, feedback_state
 
 WORLDS, SAMPLES = 3, 100
 """Worlds and samples of the trial that shows whether an observer or a law takes arrays."""
@@ -33,7 +31,7 @@ def for_worlds(part: Any, signals: int | None = None) -> Any:
     if type(part).__module__.startswith("cmg_mj.") or getattr(part, "arrays", ()):
         return part
     apart = OneByOne(part)
-    with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"), suppress(Exception):  # a user's code
+    with np.errstate(all="ignore"), suppress(Exception):  # of a user's code
         alone = _tried(apart, signals)
         with suppress(Exception):
             if np.allclose(_tried(copy.deepcopy(part), signals), alone, rtol=1e-6, equal_nan=True):
@@ -56,7 +54,7 @@ def _tried(part: Any, signals: int | None) -> np.ndarray:
     noise *= np.linspace(0.0, 0.5, SAMPLES)[:, None, None]
     state, results = part.init(Measurement(*noise[0, :3])), []
     for sample in noise:
-        fed = [] if signals is None else [feedback_state(*sample[4:7], tuple(sample[7:]))]
+        fed = [] if signals is None else [feedback_state(sample[4], sample[5], sample[6], tuple(sample[7:]))]
         state, result = part.step(state, Measurement(*sample[:3]), *fed, sample[3])
         results.append([np.reshape(number, WORLDS) for number in (result if signals is None else [result])])
     return np.array(results)
@@ -92,9 +90,8 @@ class OneByOne:
 
     def init(self, y: Measurement) -> States:
         """Return the state of each world at the first sample."""
-        worlds = _apart(y, len(y.y1))
-        self._copies = [copy.deepcopy(self.stands_for) for _ in worlds]
-        return States(part.init(one) for part, one in zip(self._copies, worlds, strict=True))
+        self._copies = [copy.deepcopy(self.stands_for) for _ in y.y1]
+        return States(part.init(_of(y, world)) for world, part in enumerate(self._copies))
 
     def step(self, states: States, *inputs: Any) -> tuple[States, Any]:
         """Advance every world by a sample.
@@ -102,9 +99,8 @@ class OneByOne:
         A world that has ended may bring NaN, which a user's code need not take: its results are NaN too.
         """
         after, results = States(), []
-        for part, state, *given in zip(
-            self._copies, states, *(_apart(value, len(states)) for value in inputs), strict=True
-        ):
+        for world, (part, state) in enumerate(zip(self._copies, states, strict=True)):
+            given = [_of(value, world) for value in inputs]
             try:
                 state, self._result = part.step(state, *given)
                 results.append(self._result)
@@ -115,15 +111,14 @@ class OneByOne:
             after.append(state)
         if np.ndim(results[0]) == 0:
             return after, np.array(results)
-        columns = [np.array(column) for column in zip(*results, strict=True)]
-        return after, Estimate(*columns) if len(columns) == 3 else tuple(columns)
+        return after, tuple(map(np.array, zip(*results, strict=True)))
 
 
-def _apart(value: Any, count: int) -> Sequence[Any]:
-    """Return a value of many worlds as a list, on floats: a measurement, what is fed back, or a number."""
-    if isinstance(value, Measurement):
-        return list(map(Measurement, *(_apart(part, count) for part in (*value, value.acceleration))))
-    if isinstance(value, FeedbackState):
-        parts = (_apart(part, count) for part in (*value, *value.extra))
-        return [feedback_state(*x[:3], x[3:]) for x in zip(*parts, strict=True)]
-    return np.broadcast_to(value, count).tolist()
+def _of(value: Any, world: int) -> Any:
+    """Return a world's part of a number, or of a tuple of numbers and its attributes, on floats."""
+    if not isinstance(value, tuple):
+        return value[world].item() if np.ndim(value) else value
+    part = tuple.__new__(type(value), [_of(number, world) for number in value])
+    for name, number in getattr(value, "__dict__", {}).items():
+        setattr(part, name, _of(number, world))
+    return part

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -215,21 +214,20 @@ def hints(design: Design, plant: Plant) -> list[str]:
     # Margin that a notch against a bend takes is no fault.
     is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
-    others = *_ceiling_hints(design), fault, _sliding_hint(scenario, law, plant)
+    others = _ceiling_hint(design), fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
 
 
-def _ceiling_hints(design: Design) -> Iterator[str]:
-    """Name the first tilt and the pushes from which no controller recovers."""
-    scenario, limit = design.scenario, ceiling(design.rig.reduced, design.law.rate_limit)
-    most = math.degrees(limit.tilt)
-    beyond = "no controller recovers from more than {:.3g} {}on this plant; a larger pair or a lighter plant does"
-    if abs(start := scenario.plant.initial_tilt_deg) > most:
-        yield f"plant.initial_tilt_deg = {start:g}: {beyond.format(most, 'deg ')}"
-    for i, push in enumerate(scenario.push):
-        most = limit.push_impulse(push.duration_s) / push.duration_s
-        if abs(push.torque_n_m) > most:
-            yield f"push.{i}.torque_n_m = {push.torque_n_m:g}: {beyond.format(most, f'N m for {push.duration_s:g} s ')}"
+def _ceiling_hint(design: Design) -> str | None:
+    """Clause for a first tilt from which no controller recovers."""
+    start = design.scenario.plant.initial_tilt_deg
+    most = math.degrees(ceiling(design.rig.reduced, design.law.rate_limit).tilt)
+    if abs(start) <= most:
+        return None
+    return (
+        f"plant.initial_tilt_deg = {start:g}: no controller recovers from more than {most:.3g} deg on this plant; a "
+        "larger pair or a lighter plant does"
+    )
 
 
 STANDS_STILL = 1e-6
