@@ -9,6 +9,7 @@ from cmg_mj.core.errors import TomlValue
 from cmg_mj.core.types import law_needs
 from cmg_mj.inputs.features import entries
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
+from cmg_mj.linear.ceiling import ceiling, ceiling_words, plant_words
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, omissions, sliding_words
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.reports import assignments, lines, number
@@ -50,6 +51,7 @@ def description(name: str, part: Experiment) -> str:
     rows = [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
+        *_plant_rows(design),
         ("", assignments(settings.changes())),
         ("", f"equilibrium bias {settings.equilibrium_bias_deg:g} deg, initial tilt {settings.initial_tilt_deg:g} deg"),
         *_law_rows(design, fields["controller"]),
@@ -79,6 +81,12 @@ def _pivot_rows(plant: Plant) -> Iterator[tuple[str, str]]:
         yield "pivot", sliding_words(plant)
         yield "", f"in the reduced model: {IN_THE_MODEL}"
         yield "", f"not in it: {NOT_IN_THE_MODEL}"
+
+
+def _plant_rows(design: Design) -> list[tuple[str, str]]:
+    """Describe the plant about its tilt line as `mount` does, and what no controller recovers from there."""
+    reduced = design.rig.reduced
+    return [("", plant_words(reduced)), ("", ceiling_words(ceiling(reduced, design.law.rate_limit)))]
 
 
 def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple[str, str]]:
@@ -124,6 +132,7 @@ def rig_description(name: str, part: Experiment, own: str = "") -> str:
     share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
     rows = [
         ("modules", ", ".join(rig.modules)),
+        *_plant_rows(part.design),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
         ("", f"omega_d = {reduced.omega_d:.6g} rad/s, m g l/sqrt(2) = {reduced.gravity_torque:.6g} N m"),
         *_pivot_rows(part.plant),

@@ -56,7 +56,7 @@ from cmg_mj.inputs.features import DRIVERS
     metavar="N",
     help="Number of the world: the run has the noise of world N in a comparison or a sweep.  [default: 0]",
 )
-@click.option("--plot", is_flag=True, help="Also write plot.png.")
+@click.option("--plot", is_flag=True, help="Also write plot.png; of several axes plot-AXIS.png for each.")
 @click.option("--live", is_flag=True, help="Show the run in a rerun viewer as it happens.")
 @users_code()
 def run(

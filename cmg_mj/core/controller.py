@@ -119,10 +119,10 @@ class Controller:
         self.open_loop_observers = dict(open_loop_observers or {})
         self._single = isinstance(world_ids, int)
         self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
-        self._law = LawRunner(law, self._single)
         observers = [observer, *self.open_loop_observers.values()]
         self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
+        self._law = LawRunner(law, self._single, len(self.extra_signals[0]))
         self.reset()
 
     @property

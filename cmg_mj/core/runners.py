@@ -13,6 +13,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar, clip
 from cmg_mj.core.errors import RunStopped
+from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.core.types import Estimate, FeedbackState, Law, Measurement, Observer, State, extra_signals
 
 _PACKAGE = str(Path(__file__).parents[1])
@@ -30,7 +31,7 @@ class ObserverRunner:
     """
 
     def __init__(self, observers: Sequence[Observer], single: bool) -> None:
-        self.observers = list(observers)
+        self.observers = list(observers) if single else [for_worlds(observer) for observer in observers]
         self._single = single
         self.extra_signals = [extra_signals(observer) for observer in observers]
         self._states: list[State] = []
@@ -108,15 +109,16 @@ class LawRunner:
     Args:
         law: The law.
         single: Whether on floats (one world) or on arrays (n_worlds,).
+        signals: The number of the observer's extra signals.
 
     Attributes:
         state: The law's memory; stages on the memory may replace it.
     """
 
-    def __init__(self, law: Law, single: bool) -> None:
-        self.law = law
+    def __init__(self, law: Law, single: bool, signals: int = 0) -> None:
+        self.law = law if single else for_worlds(law, signals)
         self.state: State = None
-        self._step = law.step
+        self._step = self.law.step
         self._least, self._most = -law.rate_limit, law.rate_limit
         self._single = single
         self._checked = False

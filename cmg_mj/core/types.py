@@ -63,8 +63,8 @@ class Observer(Protocol):
     their unit, such as ("bias_rad",), and appends the values to its estimate in that order. `BIAS` among them is what
     the summary judges and the controller can trim its integrator with.
 
-    Its constructor is given `dt` and `model`, and `noise` (`MeasurementNoise`, of the sensors' datasheet) if it takes
-    that. An attribute `needs` says what it cannot do without (`NEEDS`).
+    Its constructor is given `dt`, `model` and `noise` (`MeasurementNoise`, of the sensors' datasheet), those of them
+    that it takes. An attribute `needs` says what it cannot do without (`NEEDS`).
     """
 
     def init(self, y: Measurement) -> State:

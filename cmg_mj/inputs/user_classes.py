@@ -23,8 +23,8 @@ class UserClassKind:
         what: `observer` or `law`.
         section: The scenario's section whose `kind` names one and whose other fields are its parameters.
         known: Name a user types -> dotted path of the class.
-        always_given: Parameters that the bench gives to every class.
-        given_if_taken: Parameters that the bench gives to a class that takes them.
+        always_given: Parameters that the bench gives to a class that takes them, or any.
+        given_if_taken: Parameters that the bench gives to a class that takes them by name.
         methods: What it must have: name -> its parameters, in words.
     """
 
@@ -144,7 +144,8 @@ class UserClassKind:
         """
         cls = self.find(kind)
         self.check_names(kind, parameters)
-        names = (*self.always_given, *(name for name in self.given_if_taken if name in self.takes(kind)))
+        names = [name for name in self.always_given if self.may_take(kind, name)]
+        names += [name for name in self.given_if_taken if name in self.takes(kind)]
         arguments = {name: bench_arguments[name] for name in names}
         try:
             return cls(**arguments, **parameters)

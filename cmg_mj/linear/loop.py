@@ -37,10 +37,10 @@ OUTPUTS = ("x1_rad", "x2_rad_s", "x3_rad", "u_rad_s")
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
 TAKES = (
-    "state_feedback with adaptive, finite_difference, free_pivot, gyro_free, high_gain, kalman, linear, "
-    "linear_high_gain, ltv, luenberger"
+    *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain"),
+    *("kalman", "linear", "linear_high_gain", "ltv", "luenberger"),
 )
-"""The package's law and observers that have a slope at rest."""
+"""The package's observers that have a slope at rest."""
 NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
 
 
@@ -146,7 +146,8 @@ class ClosedLoop:
                 field = f"controller.kind = {controller.kind!r}"
             self._deciding = law_slopes(design.fresh_law(), len(extra))
         except InputError as error:
-            raise InputError(f"{field}: {error}; linear_closed_loop takes {TAKES}, or one of your own") from error
+            takes = f"linear_closed_loop takes state_feedback with {', '.join(TAKES)}, or one of your own"
+            raise InputError(f"{field}: {error}; {takes}") from error
         self._estimates = [] if true_state else [f"estimated_{name}" for name in (*OUTPUTS[:3], *extra)]
         self._channels = _channels(design, true_state)
         control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it

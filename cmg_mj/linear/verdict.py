@@ -12,6 +12,7 @@ from cmg_mj.core.reduced_model import MARGIN, ReducedModel, hold_matrices, is_hu
 from cmg_mj.core.types import Law
 from cmg_mj.inputs.features import FEATURES
 from cmg_mj.laws.state_feedback import StateFeedback, closed_loop_poles
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.linear.loop import ClosedLoop, sensors_used
 from cmg_mj.linear.plant import linear_reduced, linearise
 from cmg_mj.plant.plant import Plant
@@ -213,8 +214,20 @@ def hints(design: Design, plant: Plant) -> list[str]:
     # Margin that a notch against a bend takes is no fault.
     is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
-    others = fault, _sliding_hint(scenario, law, plant)
+    others = _ceiling_hint(design), fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
+
+
+def _ceiling_hint(design: Design) -> str | None:
+    """Clause for a first tilt from which no controller recovers."""
+    start = design.scenario.plant.initial_tilt_deg
+    most = math.degrees(ceiling(design.rig.reduced, design.law.rate_limit).tilt)
+    if abs(start) <= most:
+        return None
+    return (
+        f"plant.initial_tilt_deg = {start:g}: no controller recovers from more than {most:.3g} deg on this plant; a "
+        "larger pair or a lighter plant does"
+    )
 
 
 STANDS_STILL = 1e-6

@@ -34,7 +34,7 @@ from cmg_mj.plant.step_limit import fit_step
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.design import PlantNumbers
 from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
-from cmg_mj.scenario.schema import Scenario
+from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
@@ -88,8 +88,8 @@ class Plant:
                 f"{self._error_source}: so stiff a rig needs physics steps of {self.largest_step:.2g} s, below "
                 f"{MIN_STEP_S:g} s; soften it, or set plant.timestep_s"
             )
-        step = fit_step(grid, self.largest_step) if grid else settings.timestep_s
-        self.model.opt.timestep = step or self.largest_step
+        grid = grid or TimeGrid(0.0, settings.timestep_s, 1.0 / ControllerSettings().rate_hz)
+        self.model.opt.timestep = fit_step(grid, self.largest_step)
         data = self.new_data()
         mujoco.mj_step(self.model, data, int(np.clip(FIRST_S / self.timestep, 4, 100)))
         if not np.all(np.abs([*data.qpos, *data.qvel]) < HUGE):
@@ -301,7 +301,7 @@ def load_plant(
     Args:
         settings: Its settings; or give them as keyword arguments.
         beside: A folder that a relative model path may start from.
-        grid: The times that whole physics steps must fill; by default the step is the largest that is accurate enough.
+        grid: The times that whole physics steps must fill; by default a control period of 5 ms.
         axis_settings: The settings of axes that have their own: equilibrium bias, initial tilt, places of the
             accelerometers.
         sections: Settings of the features that edit the model, such as {"bend": Bend(frequency_hz=20.0)}.

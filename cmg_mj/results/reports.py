@@ -11,7 +11,8 @@ from rich.console import Group
 from cmg_mj.core.errors import TomlValue
 from cmg_mj.inputs.files import bundled
 from cmg_mj.inputs.user_classes import UserClassKind
-from cmg_mj.results.floors import FLOOR_ACCELERATION, FLOORS, NO_ACCELERATION_FLOOR, NOISE_ALONE
+from cmg_mj.results.baselines import MEMS_AS_BOUGHT, MEMS_GYRO
+from cmg_mj.results.floors import FLOOR_ACCELERATION, NO_ACCELERATION_FLOOR, NOISE_ALONE
 from cmg_mj.results.intervals import Interval, format_interval
 from cmg_mj.results.summary_keys import (
     AXES,
@@ -28,10 +29,18 @@ from cmg_mj.results.tables import Row, Table
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.resolve import describe_differences
 
-ABOUT_COMPARISONS = """\
+ABOUT_FIGURES = """\
+Error: RMS of the estimated tilt rate less the true one; push window: to 1 s after a push's end.
+Fit: 1 - error / RMS of the true rate; 1 is the truth, 0 an estimate of zero."""
+ABOUT_COMPARISONS = f"""\
 Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.
-Push window: from a push's start to 1 s after its end.
-Fit: 1 - RMS error / RMS of the true velocity; 1 is the truth, 0 an estimate of zero."""
+{ABOUT_FIGURES}"""
+ABOUT_RUNS = """\
+Floors: lower bounds on the error, from the tilt (floor_y1), or tilt and acceleration (floor_accel).
+mems_fused: a two-dollar gyro, fused with the tilt. All figures: summary.json, or --json."""
+BESIDE = ("velocity_rms_error_fog", "velocity_rms_rad", "velocity_fit_", "command_")
+RUN_FIGURES = [key for key in KEYS if not key.startswith(BESIDE)]
+"""Figures of the observer in the loop that `cmg-mj run` prints."""
 ABOUT_BASELINES = """\
 zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same
 after a second at rest; mems_fused, as bought, in a Kalman filter with y1; floor_y1 and floor_accel,
@@ -109,14 +118,15 @@ def run_title(summary: Row) -> str:
 def summary_table(summary: Row) -> Group:
     """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
     axes = section(summary, AXES) or {"": summary}
+    printed = {name: {key: axis[key] for key in RUN_FIGURES if key in axis} for name, axis in axes.items()}
     end = outcome_in_words(str(summary["outcome"]), summary["end_time_s"])
-    tables = [figures_table(axes, {next(iter(axes)): end}, run_title(summary))]
-    floors: list[str] = []
+    tables, floors = [figures_table(printed, {next(iter(axes)): end}, run_title(summary))], ""
     for name, axis in axes.items():
         if figures := open_loop_figures(axis):
-            tables.append(estimates_table(f"Open loop, {name}" if name else "Open loop", figures))
-            floors += [floor for floor in FLOORS if floor in figures]
-    return Group(*(table.rich() for table in tables), *([about_floors(floors)] if floors else []))
+            shown = {other: figures[other] for other in figures if other not in (MEMS_AS_BOUGHT, MEMS_GYRO)}
+            tables.append(estimates_table(f"Open loop, {name}" if name else "Open loop", shown))
+            floors = f"\n{ABOUT_RUNS}\n{about_floors(figures)}"
+    return Group(*(table.rich() for table in tables), ABOUT_FIGURES + floors)
 
 
 def outcome_in_words(kind: str, time_s: SummaryValue) -> str:

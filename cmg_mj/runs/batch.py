@@ -14,6 +14,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.core.types import State, extra_signals
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
@@ -113,7 +114,7 @@ class BatchedObservers:
         self.extra_signals = extra_signals(parts[0][0])
         self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
         observers, worlds = zip(*parts, strict=True)
-        self._parts = list(zip(observers, neighbours(worlds), strict=True))
+        self._parts = list(zip(map(for_worlds, observers), neighbours(worlds), strict=True))
 
     def init(self, y: Measurement) -> list[State]:
         """Return each observer's state at the first sample."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import Any, Unpack
 
@@ -10,8 +11,8 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.design import StageOptions, make_controller
-from cmg_mj.scenario.schema import ObserverSettings
+from cmg_mj.scenario.design import Design, StageOptions, make_controller
+from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.sensors import Sensors
 from cmg_mj.stages.turning import compensation
 
@@ -46,10 +47,13 @@ def controller(
             f"law = {law!r}: must be a law, not its name. Give StateFeedback(dt=0.005, gains=...), or "
             "prepare(scenario).law of a scenario with this [controller]"
         )
-    law, sensors = law or StateFeedback(dt=0.005), sensors or Sensors()
+    sensors, papers = sensors or Sensors(), law is None
+    law = law or StateFeedback(dt=0.005)
     controllers = []
     for i, name in enumerate(plant.axis_names):
         part, made = plant.single_axis(name), observer
+        if papers:
+            _hint(Design(Scenario(sensors=sensors), part.parameters, law))
         if isinstance(made, (str, Mapping)):
             settings = ObserverSettings(**({"kind": made} if isinstance(made, str) else made))
             made = settings.make(law.dt, part.reduced, part.parameters.noise(sensors))
@@ -58,3 +62,12 @@ def controller(
     if len(controllers) == 1:
         return controllers[0]
     return MultiAxisController(controllers, compensation(plant.turning, sensors.mems_gyro))
+
+
+def _hint(design: Design) -> None:
+    """Say where the papers' gains do not suit a plant."""
+    from cmg_mj.linear.verdict import judge_gains  # no loop of a scenario needs it
+
+    if hint := judge_gains(design).hint:
+        cure = "here law=StateFeedback(dt=0.005, gains=scaled_gains(plant.reduced)) of cmg_mj.laws"
+        logging.getLogger("cmg_mj").warning("hint: %s; %s", hint, cure)

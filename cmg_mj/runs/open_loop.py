@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.core.types import extra_signals
 from cmg_mj.observers import Estimate, Measurement, Observer
 from cmg_mj.results.trajectory import ESTIMATES, Trajectory
@@ -41,6 +42,8 @@ def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarr
     for column in columns.values():
         column[0] = 0.0 * first.y1
     columns["x1_rad"][0], columns["x3_rad"][0] = first.y1, first.y2
+    if y1.ndim > 1:
+        observer = for_worlds(observer)
     state = observer.init(first)
     for row, (measurement, u) in enumerate(zip(measurements, _rows(trajectory["u_rad_s"]), strict=False), 1):
         state, estimate = observer.step(state, measurement, u)

@@ -51,9 +51,10 @@ def load_scenario(
     # Of gains and lqr, the one that --set does not give goes; with another law both.
     given = [f"{field}." for field in names]
     unset = [name for name in ("gains", "lqr") if not any(f.startswith(f"controller.{name}.") for f in given)]
-    if len(unset) == 1 or _kind_of(fields, "controller") != law:
+    settings = fields.get("controller")
+    if isinstance(settings, dict) and (len(unset) == 1 or _kind_of(fields, "controller") != law):
         for field in unset:
-            fields.get("controller", {}).pop(field, None)
+            settings.pop(field, None)
     scenario = parse_scenario(fields, " ".join([name, *(["with"] if changes else []), *changes]))
     if "plant.model" not in names:
         scenario = find_model(scenario, path.parent)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmg_mj.features.mounting.limits import ceiling
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
 from cmg_mj.results.tables import markdown_table

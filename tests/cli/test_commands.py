@@ -7,6 +7,7 @@ import os
 import pty
 import re
 import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from cmg_mj.cli import cli
 from cmg_mj.inputs.files import bundled
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.baselines import BASELINES
-from tests.command import COMMAND, cmg_mj, environment
+from tests.command import COMMAND, ROOT, cmg_mj, environment
 
 SUMMARY = [
     "observer",
@@ -45,6 +46,49 @@ def quick() -> str:
     """A short scenario with a push."""
     Path("quick.toml").write_text("title = 'Quick'\nduration_s = 0.4\n[[push]]\nstart_s = 0.2")
     return "quick.toml"
+
+
+# --- what the plain installation has -------------------------------------------------------------------------
+
+BARE = """
+import re, sys
+from importlib.machinery import PathFinder
+from importlib.metadata import requires
+extras = {re.match("[a-zA-Z0-9]+", line)[0] for line in requires("cmg_mj") if "extra ==" in line} - {"rerun"}
+genuine = PathFinder.find_spec
+PathFinder.find_spec = lambda name, *others: None if name in extras else genuine(name, *others)
+from cmg_mj.cli import main
+main(sys.argv[1:])
+"""
+"""A process in which no package of an extra can be imported."""
+
+
+@pytest.mark.parametrize(
+    ("command", "extra"),
+    [
+        ("export gyro_free", "export"),
+        ("plugin gyro_free", "export"),
+        ("run quick.toml --driver plugin", "export"),
+        ("mount ROBOT --body torso --axis x --quick --plugin", "export"),
+        ("reproduce sokolov2019", "papers"),
+        ("reproduce all", "papers"),
+        ("sweep quick.toml --vary duration_s=0.3,0.4 --cluster local:1", "cluster"),
+        ("compare quick.toml --observers linear --worlds 2", None),
+        ("tune quick.toml --observer linear --worlds 2", None),
+        ("check quick.toml", None),
+        ("studio --help", None),
+    ],
+)
+def test_a_command_without_its_extra_names_it_in_one_line(command: str, extra: str | None, quick: str) -> None:
+    arguments = command.replace("ROBOT", str(ROOT / "examples/robots/torso.xml")).split()
+    process = subprocess.run(
+        [sys.executable, "-c", BARE, *arguments], env=environment(), capture_output=True, text=True, timeout=900.0
+    )
+    if extra is None:
+        assert process.returncode == 0, process.stderr
+    else:
+        assert process.returncode == 2
+        assert re.fullmatch(rf'cmg-mj: .*: python -m pip install "cmg_mj\[{extra}\]"\n', process.stderr), process.stderr
 
 
 # --- help ----------------------------------------------------------------------------------------------------
@@ -136,12 +180,17 @@ def test_a_person_reads_a_table_and_where_the_files_are(quick: str) -> None:
         r"Tilt RMS \[deg\] +\d",
         r"ltv +0\.\d+ +0\.\d+ +-?\d",
         r"zero +0\.\d+ +0\.\d+ +0\.00 +0\.00\n",
-        r"mems_as_bought +0\.3\d+ +0\.3\d+ +-\d",
-        r"mems_gyro +0\.0\d+ +0\.0\d+ +0\.9\d",
         r"mems_fused +0\.0\d+ +0\.0\d+ +0\.\d",
+        r"Error: RMS of the estimated tilt rate less the true one",
+        r"Fit: 1 - error / RMS of the true rate",
+        r"Floors: lower bounds on the error",
         r"Floors are for the sensors' noise alone",
     ):
         assert re.search(row, outcome.out)
+    assert not re.search(r"mems_as_bought|mems_gyro|[Cc]ommand|Fit in|against the gyro|True velocity", outcome.out)
+    written = json.loads(Path("runs/quick-homogeneous-0/summary.json").read_text())
+    assert {"mems_as_bought", "mems_gyro"} <= set(written["references"])
+    assert {"velocity_fit_push", "command_rms_rad_s", "velocity_rms_rad_s"} <= set(written)
     folder = "runs/quick-homogeneous-0"
     assert outcome.err == f"Written to {folder}. Open the recording: rerun {folder}/recording.rrd\n"
     assert (Path(folder) / "recording.rrd").exists()

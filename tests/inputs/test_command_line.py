@@ -25,6 +25,7 @@ from tests.inputs.complaints import assert_in_order, table
     ("a push's number in letters", ["--set", "push.².torque_n_m=1"], "there is no push.²"),
     ("below a field", ["--set", "plant.model.x=3"], "plant.model is not a section"),
     ("a section's value", ["--set", "plant=3"], "plant = 3: must be a section"),
+    ("a law's value", ["--set", "controller.kind=lqg", "--set", "controller=3"], "controller = 3: must be a section"),
     ("a negative seed", ["--seed", "-1"], "Invalid value for '--seed': -1 is not in the range 0<=x<="),
     ("a seed in letters", ["--seed", "x"], "Invalid value for '--seed': 'x'"),
     ("unknown option", ["--sed", "3"], "No such option", "--sed", "--seed"),

@@ -270,7 +270,7 @@ def test_an_equilibrium_bias_is_a_constant_error_of_y1() -> None:
 @pytest.mark.parametrize("kind", OBSERVERS)
 def test_observers_with_a_slope_are_those_listed(kind: str) -> None:
     of = experiment(kind)
-    if kind in TAKES.replace(" with ", ", ").split(", "):
+    if kind in TAKES:
         system = of.linear_closed_loop()
         assert "estimated_x2_rad_s" in system.output_labels
         assert np.max(np.abs(system.poles())) < 1.0

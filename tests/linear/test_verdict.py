@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -151,3 +152,32 @@ def test_a_notch_is_in_the_rigid_loop() -> None:
     assert "or a notch above 8 Hz is needed" in (notched.hint or "")
     out = cmg_mj("check", "push_recovery", "--set=controller.notch_hz=8").out
     assert "              notch at 8 Hz on the command\n" in out
+
+
+@pytest.mark.parametrize("mass", ["1.66", "166"])
+def test_inertia_gravity_and_the_ceiling_are_the_whole_rigs(mass: str) -> None:
+    """MuJoCo's mass matrix and centre of mass say the same. A frame of 166 kg a module is beyond any controller."""
+    for path in folder("models").glob("*.xml"):
+        Path(path.name).write_text(path.read_text().replace('mass="1.66"', f'mass="{mass}"'))
+    model = mujoco.MjModel.from_xml_path("scissored_pair.xml")
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    body, dof = int(model.joint("tilt").bodyid[0]), int(model.joint("tilt").dofadr[0])
+    arm = np.linalg.norm(data.subtree_com[body] - data.xanchor[model.joint("tilt").id])
+    gravity = float(model.body_subtreemass[body] * 9.81 * arm)
+    start, tilted = "plant.model=scissored_pair.xml", "plant.initial_tilt_deg=0.1"
+    for command in (["scissored_pair.xml"], ["push_recovery", "--set", start]):
+        checked = cmg_mj("check", *command)
+        assert f"inertia {inertia[dof, dof]:.4g} kg m^2, gravity {gravity:.4g} N m, momentum 0.6908" in checked.out
+        (most,) = re.findall(
+            r"any controller.* recovers from at most ([\d.]+) deg, or a push of 4\.\d+ N m", checked.out
+        )
+        assert (float(most) < 1.0) == (mass == "166")
+        hint = f"hint        plant.initial_tilt_deg = 1: no controller recovers from more than {most} deg on this plant"
+        assert (hint in checked.out) == (mass == "166")
+    assert (
+        "initial_tilt" not in cmg_mj("check", "push_recovery", "--set", start, "--set", tilted).out.partition("hint")[2]
+    )

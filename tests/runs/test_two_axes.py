@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cmg_mj.features.mounting.limits import ceiling
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.results.result import Result
 from cmg_mj.results.summary_keys import section
 from cmg_mj.runs.experiment import Experiment, prepare

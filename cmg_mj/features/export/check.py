@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import casadi
@@ -21,6 +22,7 @@ from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.symbol import LawNotExportable
 from cmg_mj.features.export.trace import Traced, law_arguments
 from cmg_mj.laws import StateFeedback
+from cmg_mj.linear.slopes import law_slopes
 
 TICKS = 400
 
@@ -121,9 +123,15 @@ def columns(controller: Controller) -> list[str]:
     return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
 
 
-def rounded(expected: np.ndarray, precision: Precision) -> np.ndarray:
-    """Return how far each column may be off by rounding, (4 + extra signals,)."""
-    return SHARE[precision] * np.abs(expected).max(axis=0)
+def rounded(controller: Controller, expected: np.ndarray, precision: Precision) -> np.ndarray:
+    """Return how far each column may be off by rounding, u also by that of the estimate, (4 + extra signals,)."""
+    off = SHARE[precision] * np.abs(expected).max(axis=0)
+    with suppress(InputError):  # a law without a slope
+        slopes = np.abs(law_slopes(controller.law, len(controller.extra_signals[0])).D[0, 4:])
+        if controller.angle_source == "measured":
+            slopes[[0, 2]] = 0.0
+        off[-1] += slopes @ off[:-1]
+    return off
 
 
 def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
@@ -135,7 +143,7 @@ def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, p
     near = samples.astype(kind)
     ends = np.where(np.random.default_rng(0).random(samples.shape) < 0.5, -np.inf, np.inf).astype(kind)
     moved = np.abs(in_python(controller, np.nextafter(near, ends).astype(float)) - expected)
-    return rounded(expected, precision) + ROUNDINGS * moved.max(axis=0)
+    return rounded(controller, expected, precision) + ROUNDINGS * moved.max(axis=0)
 
 
 def check_trace(controller: Controller, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:

@@ -53,12 +53,13 @@ def export(
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
     from cmg_mj.features.export import check_installed, generate_code, write_code
+
+    check_installed()  # which the modules below import
     from cmg_mj.features.export.names import name_of
     from cmg_mj.features.export.pipeline import export_table
     from cmg_mj.linear.verdict import require_stable_period
     from cmg_mj.runs.experiment import prepare
 
-    check_installed()
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
     experiment.require_single_axis("export")
     require_stable_period(experiment.law, experiment.plant.reduced)

@@ -114,7 +114,7 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
             for file, text in files.items():
                 write_text(Path(temporary, file), text)
             off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
-        bounds = zip(check.columns(controller), check.rounded(expected, precision), strict=True)
+        bounds = zip(check.columns(controller), check.rounded(controller, expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
     return Code(files, figures, printer.law)
 

@@ -17,6 +17,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.mounting.stance import simulated_pole
+from cmg_mj.linear.ceiling import PUSH_S, RecoverableLimit, ceiling
 from cmg_mj.linear.verdict import SlidingPoles, sliding_poles
 from cmg_mj.plant.mjcf import quiet, set_control_callback
 from cmg_mj.plant.plant import Plant
@@ -26,71 +27,9 @@ from cmg_mj.scenario.design import Design, PlantNumbers
 from cmg_mj.scenario.time_grid import common_period
 from cmg_mj.stages.push import Push, Pushes
 
-
-class RecoverableLimit(NamedTuple):
-    """Upper bound for any controller, on the linearised reduced model (6) with the gimbals' geometry kept.
-
-    With lambda^2 = m g h/J, the part z = x1 + x2/lambda of a state grows as z' = lambda z - (H/J) cos(x3) u/lambda.
-    Nothing takes more off it than gimbals that turn at once as fast as they can, x3 = u t, up to their travel theta. It
-    is recoverable if
-
-        z < (H/J) S,   S = 1/lambda integral of e^(-lambda t) u cos(u t) dt from 0 to T = theta/u
-                         = u/(lambda^2 + u^2) [1 + e^(-lambda T) ((u/lambda) sin theta - cos theta)]
-
-    A push tau(t) that begins at t = 0 adds tau/(J lambda) to z', and an upright rig, whose gimbals turn from that
-    moment on, recovers if
-
-        integral of e^(-lambda t) tau(t)/(J lambda) dt < (H/J) S
-    """
-
-    tilt: float
-    """The largest tilt from which a rig at rest recovers, (H/J) S [rad]."""
-    impulse: float
-    """The largest impulse about the line that an upright rig recovers from if it comes all at once, J lambda times the
-    tilt [N m s]. Gimbals take off a part of a held push while it lasts: see `push_impulse`."""
-    pole: float
-    """lambda [1/s]."""
-
-    def push_impulse(self, duration_s: float) -> float:
-        """Compute the largest impulse about the line that an upright rig recovers from, brought by a constant torque.
-
-        With x = lambda D, a torque tau for D adds tau/(J lambda^2) (1 - e^-x) to what is to be recovered from, so that
-        tau D = blow x/(1 - e^-x).
-
-        Args:
-            duration_s: D, how long the push is held [s].
-
-        Returns:
-            The impulse [N m s].
-        """
-        x = self.pole * duration_s
-        return self.impulse * (x / -math.expm1(-x) if x > 0.0 else 1.0)
-
-
-def ceiling(model: ReducedModel, rate_limit: float, travel: float = math.pi / 2.0) -> RecoverableLimit:
-    """Compute the limits for any controller on a rig.
-
-    Args:
-        model: Its reduced model.
-        rate_limit: u, the gimbals' largest rate [rad/s].
-        travel: theta, how far they turn from upright; beyond a quarter turn a gimbal pushes the other way [rad].
-
-    Returns:
-        The ceiling.
-    """
-    u = rate_limit
-    pole = math.sqrt(model.gravity_torque / model.J1)
-    momentum = model.J_d * model.omega_d
-    left = math.exp(-pole * travel / u)
-    S = u / (pole**2 + u**2) * (1.0 + left * (u / pole * math.sin(travel) - math.cos(travel)))
-    tilt = momentum / model.J1 * S
-    return RecoverableLimit(tilt, model.gimbals * model.J1 * pole * tilt, pole)
-
-
 WORLDS = 10
 LEVELS = 24
 """Pushes tried at once, and then as many between the largest tolerated one and the next."""
-PUSH_S = 0.1
 BEFORE_S = 1.0
 """The loop runs for so long before the push comes [s]."""
 AFTER_TIME_CONSTANTS = 10.0

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from cmg_mj.features.mounting.limits import LOW_LIMIT_DEG, PUSH_S, WORLDS
 from cmg_mj.features.mounting.push import MAX_SEARCH_S, MIN_SHARE, OTHER_WORLDS, UNPUSHED_S, SimulatedPush
 from cmg_mj.features.mounting.write import MountResult
+from cmg_mj.linear.ceiling import ceiling_words, plant_words
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.plant.tilt_line import HingeLine
 
-BUSY = ": run it again while the machine does nothing else, or take E alone by --quick"
+BUSY = ": run it again while the machine does nothing else; till then the scenario's push is 0.6 E"
 """Advice where the time did not suffice, in clauses."""
 
 
@@ -24,7 +25,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     Yields:
         Lines.
     """
-    mounted, plant, figures = result.mounted, result.plant, result.push_limits.figures()
+    mounted, plant = result.mounted, result.plant
     line = plant.axis.line
     joint = plant.model.joint(line.joint).name
     about = f"the hinge {joint!r}" if isinstance(line, HingeLine) else "the line that it stands on"
@@ -40,14 +41,8 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
             f"  its physics steps of {1e3 * file:.4g} ms are {1e3 * runner:.4g} ms in the plugin's model, as in runs: "
             "whole steps fit between two samples"
         )
-    yield (
-        f"  inertia {figures['inertia_kg_m2']:.4g} kg m^2, gravity {figures['gravity_torque_n_m']:.4g} N m, momentum "
-        f"{figures['momentum_n_m_s']:.4g} N m s, falls with {figures['pole_1_s']:.3g} 1/s"
-    )
-    yield (
-        f"  any controller, from upright gimbals (linear model): recovers from at most {figures['limit_tilt_deg']:.3g} "
-        f"deg, or a push of {figures['limit_push_torque_n_m']:.3g} N m for {PUSH_S:g} s"
-    )
+    yield f"  {plant_words(result.push_limits.reduced)}"
+    yield f"  {ceiling_words(result.push_limits.limit)}"
     yield from _pivot(result)
     margin = result.push_limits.push_margin.median_impulse
     reduced = (

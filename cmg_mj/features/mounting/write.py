@@ -169,7 +169,9 @@ def write_scenario(
     common = parts.pop("")
     axes = {name: {section: its for section, its in part.items() if its} for name, part in parts.items()}
     axes = {name: part for name, part in axes.items() if part}
-    largest = simulated.impulse if simulated else limits.push_margin.median_impulse if limits else 0.0
+    largest = limits.push_margin.median_impulse if limits else 0.0
+    if simulated and (simulated.complete or simulated.impulse):
+        largest = simulated.impulse
     push = {
         **({"axis": axis} if axis else {}),
         "start_s": PUSHED_AT_S,

@@ -11,7 +11,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stdout, suppress
 from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -44,16 +44,15 @@ def dask_setup(worker: Worker) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-@contextmanager
-def on_cluster(address: str) -> Iterator[Callable[..., None]]:
+def on_cluster(address: str) -> AbstractContextManager[Callable[..., None]]:
     """Connect to a cluster to run sweeps on.
 
     Args:
         address: The scheduler's address, or `local:N` for a cluster of N workers that is started here, on the loopback,
             and ended with the context.
 
-    Yields:
-        The function that runs the chunks, as `chunks.run` does.
+    Returns:
+        Connects when it is entered, and gives the function that runs the chunks, as `chunks.run` does.
 
     Raises:
         InputError: The address is not written so, the cluster cannot be reached, or `distributed` is not installed.
@@ -66,9 +65,14 @@ def on_cluster(address: str) -> Iterator[Callable[..., None]]:
         )
     if find_spec("distributed") is None:
         raise InputError('--cluster: distributed is not installed: python -m pip install "cmg_mj[cluster]"')
+    return _connected(address, written["workers"])
+
+
+@contextmanager
+def _connected(address: str, workers: str | None) -> Iterator[Callable[..., None]]:
+    """Connect to a cluster, or to so many workers that are started here."""
     import distributed
 
-    workers = written["workers"]
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said here, in a line
     with ExitStack() as stack:
         try:

@@ -80,6 +80,7 @@ def sweep(
 
     study = _study(arguments, varied, observers, worlds, sample)
     check_values(study)
+    running = nullcontext(run_here) if cluster is None else on_cluster(cluster)
     if dry_run:
         cost = estimate_cost(study)
         text = (
@@ -94,7 +95,7 @@ def sweep(
             "(--dry-run prints time and memory)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
-    with nullcontext(run_here) if cluster is None else on_cluster(cluster) as run:
+    with running as run:
         store = Store.open(path, study, overwrite=overwrites())
         left = store.left()
         if before := study.trials_without(left):

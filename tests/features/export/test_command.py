@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export import check_installed, export
+from cmg_mj.features.export import check_installed, export, generate_code, write_code
 from cmg_mj.results import folder
 from tests.command import cmg_mj
 from tests.features.export.compiled import compile_c, controller, needs_compiler
@@ -141,6 +141,27 @@ def test_c_that_is_not_what_python_runs_is_not_left(monkeypatch: pytest.MonkeyPa
     with pytest.raises(InputError, match=r"the C is not what Python runs: .*x2_rad_s: off by at most"):
         export(controller("linear"), tmp_path / "board")
     assert not (tmp_path / "board").exists()
+
+
+@needs_compiler
+@pytest.mark.parametrize("k2", [46.0, 300.0])
+def test_large_gains_amplify_rounding_and_are_still_looked_at(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, k2: float
+) -> None:
+    """u is off by k2 times what the rate is off by; k2 itself may not be off by half a percent."""
+    monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 400)
+    loop = controller("gyro_free", f"controller.gains=[{8.0 * k2}, {k2}, -1.1, 0.35]")
+    code = generate_code(loop, "single")
+    off = code.figures["c_off_by"]
+    assert off["u_rad_s"] < 1.1 * k2 * off["x2_rad_s"] + 1e-4
+    assert code.figures["beyond_rounding"] == []
+    header, source, example, _ = write_code(tmp_path / "board", code)
+    for gain, status in ((k2, 0), (1.005 * k2, 1)):
+        text, count = re.subn(r"(?<=gain_x2 = )[\d.]+f", f"{gain}f", source.read_text())
+        assert count == 1
+        Path("changed.c").write_text(text)
+        compile_c(f"-I{header.parent}", "changed.c", example, "-lm", "-o", "changed")
+        assert subprocess.run(["./changed"], capture_output=True, check=False).returncode == status
 
 
 def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

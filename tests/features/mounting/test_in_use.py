@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
+import cmg_mj
 from cmg_mj.features.gymnasium import ScissoredPairEnv
 from cmg_mj.features.mounting import mount
 from cmg_mj.features.mounting.write import write_scenario
+from cmg_mj.laws import StateFeedback, scaled_gains
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.features.gymnasium.test_gymnasium_env import act
@@ -54,3 +57,37 @@ def test_the_environment_gives_it_too(scenario: str) -> None:
     assert len(ticks) == 200
     for name in ("x1_rad", "x2_rad_s", "x3_rad"):
         np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])
+
+
+STICK = """
+<mujoco>
+  <option timestep="{step}"/>
+  <worldbody>
+    <body name="stick" pos="0 0 0.1">
+      <joint name="lean" type="hinge" axis="1 0 0"/>
+      <geom type="capsule" fromto="0 0 0 0 0 0.8" size="0.03" density="800"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("step", [0.0007, 0.002, 0.003, 0.005])
+def test_it_stands_in_ones_own_loop_with_gains_of_its_own_and_the_papers_are_hinted_at(
+    step: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Whole physics steps fill the 5 ms between two decisions, whatever the model file's step is."""
+    spec = mujoco.MjSpec.from_string(STICK.format(step=step))
+    plant = cmg_mj.load_plant(model=str(mount(spec, "stick", axis="lean").save("balanced.xml")), initial_tilt_deg=0.5)
+    assert plant.timestep <= step
+    law = StateFeedback(dt=0.005, gains=scaled_gains(plant.reduced))
+    cmg_mj.controller(cmg_mj.load_plant())
+    for given, stands in ((law, True), (None, False)):
+        assert not caplog.records
+        controller, data = cmg_mj.controller(plant, "gyro_free", law=given), plant.new_data()
+        with cmg_mj.control_callback(plant, controller):
+            while data.time < 3.0:
+                mujoco.mj_step(plant.model, data)
+        assert (abs(data.qpos[plant.tilt] - plant.tilt_zero) < 0.1) == stands
+    assert "the closed loop is unstable" in caplog.text
+    assert "scaled_gains(plant.reduced)" in caplog.text

@@ -12,10 +12,11 @@ from scipy.integrate import quad
 
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.limits import PUSH_S, ceiling, push_margin
+from cmg_mj.features.mounting.limits import PUSH_S, push_margin
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.laws import TABLE_2_GAINS, scaled_gains
 from cmg_mj.laws.state_feedback import closed_loop_poles
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.runs.experiment import Experiment
 

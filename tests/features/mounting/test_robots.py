@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.mounting import mount
-from cmg_mj.features.mounting.limits import PUSH_S, PushLimits, RecoverableLimit, ceiling, push_limits
+from cmg_mj.features.mounting.limits import PUSH_S, PushLimits, push_limits
 from cmg_mj.features.mounting.stance import simulated_pole
 from cmg_mj.features.mounting.write import PUSHED_AT_S, write_scenario
+from cmg_mj.linear.ceiling import RecoverableLimit, ceiling
 from cmg_mj.plant.tilt_line import HingeLine, SupportLine
 from cmg_mj.runs.experiment import Experiment, prepare
 from tests.features.mounting.robots import ROBOTS

@@ -15,9 +15,10 @@ from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.features.mounting import mount, write
 from cmg_mj.features.mounting import push as simulated_push
-from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, PushLimits, PushMargin, ceiling, push_limits
+from cmg_mj.features.mounting.limits import PUSH_S, WORLDS, PushLimits, PushMargin, push_limits
 from cmg_mj.features.mounting.push import MARGIN, RESOLUTION, SimulatedPush, TimeLimit
 from cmg_mj.features.mounting.write import PUSH_SHARE, write_scenario
+from cmg_mj.linear.ceiling import ceiling
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
@@ -174,7 +175,8 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
         (SimulatedPush(10, 0.3, complete=False), "60 s did not suffice for one that 20 others stand"),
         (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed"),
         (SimulatedPush(28, worlds=30), "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall"),
-        (SimulatedPush(None, complete=False), "by its reduced model E"),
+        (SimulatedPush(None, complete=False), "in MuJoCo nothing found within 60 s"),
+        (SimulatedPush(10, complete=False), "till then the scenario's push is 0.6 E"),
     ],
 )
 def test_it_says_what_the_robot_itself_stands(
@@ -186,8 +188,9 @@ def test_it_says_what_the_robot_itself_stands(
     assert text in done.out
     assert ("it does not stand; take a larger --scale" in done.out) == simulated.falls
     pushes = load_scenario("rig.toml").push
-    torques = [PUSH_SHARE * simulated.impulse / PUSH_S] if simulated.impulse else []
-    assert [push.torque_n_m for push in pushes] == pytest.approx(torques)
+    E = 0.4  # of the fixture; where the search came to no end, nothing better is known
+    torque = PUSH_SHARE * (simulated.impulse if simulated.complete else simulated.impulse or E) / PUSH_S
+    assert [push.torque_n_m for push in pushes] == pytest.approx([torque] if torque else [])
 
 
 def test_the_demands_of_a_pair(pendulum: tuple[str, ...]) -> None:
