@@ -35,6 +35,12 @@ SAME_PERIOD = 1e-3
 """Relative difference up to which the line through the rows has their period."""
 GAP_PERIODS = 1.5
 """A gap is longer than so many periods."""
+PACKET = 1.75
+"""Rows with longer usual steps between them, in their mean, come in packets: what is between is not known."""
+LOST = 1.25
+"""Mean step, in periods, up to which single rows are lost."""
+PAUSE = 3.0
+"""Longer steps, in usual ones between packets, are pauses."""
 MIN_SAMPLES = 20
 """A segment with fewer samples is discarded."""
 BRIDGED = 5
@@ -249,7 +255,14 @@ def _sample(
     """
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
-    period = float(steps[steps <= GAP_PERIODS * float(np.median(steps))].mean())
+    period, between = _pace(steps)
+    gap = GAP_PERIODS * period
+    cure = f"leave time out and give --rate {1.0 / period:.4g}"
+    if between > PACKET * period:
+        raise InputError(
+            f"{path}: its rows come in packets, {1e3 * np.median(steps[steps < period]):.4g} ms apart with "
+            f"{1e3 * between:.4g} ms between, so their times are not those of the measurements: {cure}"
+        )
     if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / slowest:
         raise InputError(
             f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
@@ -260,16 +273,18 @@ def _sample(
         period = 1.0 / round_rate
     dt = period if options.rate_hz is None else 1.0 / options.rate_hz
     max_gap = BRIDGED * period if options.max_gap_s is None else options.max_gap_s
-    gaps = steps > GAP_PERIODS * period
-    divided = steps > max(GAP_PERIODS * period, max_gap + period)
+    gaps = steps > gap
+    divided = steps > max(gap, max_gap + period)
     stretches = [slice(start, end) for start, end in pairwise([0, *(np.flatnonzero(divided) + 1), len(time)])]
     resolution = _resolution(time)
     even = all(_is_even(time[rows], period, resolution) for rows in stretches)
+    even &= not between or steps.max() <= period + resolution
     resampled = not even or abs(dt - period) > 1e-6 * dt
-    shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), steps[~gaps].max()))
+    shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), max(between, steps[~gaps].max())))
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
-        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines")
+        own = f"; if they were measured evenly, {cure}" if between else ""
+        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
         notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
     for what, which in (
@@ -285,7 +300,7 @@ def _sample(
     if sum(lengths) > MAX_SAMPLES:
         raise InputError(f"{path}: {sum(lengths):,.0f} samples at {1.0 / dt:g} Hz; at most {MAX_SAMPLES:,}")
     segments = [
-        _segment(time[rows], _select(values, rows), period, dt, resampled)
+        _segment(time[rows], _select(values, rows), gap, dt, resampled)
         for rows, length in zip(stretches, lengths, strict=True)
         if length >= MIN_SAMPLES - 1.5
     ]
@@ -296,6 +311,24 @@ def _sample(
     if len(segments) < len(stretches):
         notes.append(f"{len(stretches) - len(segments)} parts with fewer than {MIN_SAMPLES} samples discarded")
     return period, dt, segments
+
+
+def _pace(steps: np.ndarray) -> tuple[float, float]:
+    """Return the period of rows, and the usual step between packets of them, or 0 [s].
+
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost. Otherwise long
+    and short steps take turns, and the period is their mean, from the first packet to the last.
+    """
+    period = float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
+    longer = steps > GAP_PERIODS * period
+    if longer.sum() > max(4.0, steps[~longer].sum()):
+        between = float(np.median(steps[longer]))
+        first, *_, last = np.flatnonzero(longer) + 1
+        whole = steps[first:last]
+        mean = float(whole[whole < PAUSE * between].mean())
+        if mean > LOST * period or longer.mean() > LOST - 1.0:
+            return mean, between
+    return period, 0.0
 
 
 def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) -> tuple[np.ndarray, Values]:
@@ -319,9 +352,10 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         )
     again = steps <= SAME_TIME * np.median(steps)
     if again.mean() > FEW_REPEATED:
+        rate = "HZ" if again.all() else f"{np.argmax(time == time[-1]) / (time[-1] - time[0]):.4g}"
         raise InputError(
             f"{path}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps are too "
-            "coarse; leave time out and give --rate"
+            f"coarse; leave time out and give --rate {rate}"
         )
     if again.any():
         rows, first = _counted(again.sum(), "row"), time[1:][again][0]
@@ -331,9 +365,9 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     return time, values
 
 
-def _segment(time: np.ndarray, values: Values, period: float, dt: float, resampled: bool) -> Segment:
+def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled: bool) -> Segment:
     """Sample rows without a gap every dt."""
-    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=GAP_PERIODS * period)
+    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=gap)
     places = np.arange(int(stamps[-1] / dt + 1e-6) + 1)
     if not resampled:
         # Rows stay where they are, and those that are missing come between them.
@@ -413,7 +447,8 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
     sampled = []
     for segment in segments:
         grid, stamps = segment.time, segment.when(time) - delay_s
-        gap = GAP_PERIODS * float(np.median(np.diff(stamps)))
+        period, between = _pace(np.diff(stamps))
+        gap = (2.0 if between else GAP_PERIODS) * period
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)
         before, later = grid - stamps[after - 1], stamps[after] - grid
