@@ -469,8 +469,8 @@ def _stamps(name: str, text: pa.ChunkedArray, decimal: str) -> pa.ChunkedArray:
     strange = pc.index(pc.and_(pc.is_valid(text), pc.is_null(parts)), True).as_py()
     if strange >= 0:
         raise InputError(
-            f"{name}: {shortened(text[strange].as_py())!r} in row {strange + 1} is not a number or an ISO date, such as "
-            "2026-11-25T10:00:00.25Z"
+            f"{name}: {shortened(text[strange].as_py())!r} in row {strange + 1} is not a number or an ISO date, as "
+            "2026-11-25T10:00:00.25Z is"
         )
     day, clock, fraction, zone = (pc.struct_field(parts, i) for i in range(4))
     if len(set(pc.unique(pc.equal(zone, "")).drop_null().to_pylist())) > 1:

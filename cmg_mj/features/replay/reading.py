@@ -215,7 +215,7 @@ def _times(
 def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
     """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
 
-    A signal that comes to its end quickly, stays, and leaves quickly is clipped; a quantiser's turns round in few steps.
+    A signal that comes to its end quickly, stays, and leaves quickly is clipped. A quantised one turns in few steps.
     """
     clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
     rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))

@@ -411,8 +411,8 @@ def test_what_is_clipped_is_named_and_not_compared(place: str, ending: str, tmp_
     log = read(tmp_path, columns)
     clipped = columns[place] == limit
     assert log.notes == (
-        f"{clipped.sum():,} rows of '{place}' stand at the same {ending}: its sensor is clipped there, and the reference "
-        "is not compared",
+        f"{clipped.sum():,} rows of '{place}' stand at the same {ending}: its sensor is clipped there, and the "
+        "reference is not compared",
     )
     np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), clipped)
 

@@ -113,7 +113,7 @@ def test_a_delay_below_its_error_is_none(tmp_path: Path) -> None:
 
 def test_what_cannot_be_compared_says_why(tmp_path: Path) -> None:
     """Too short, with gaps, or without motion."""
-    for rows in (np.arange(N) < 60, np.arange(N) % 30 > 4):
+    for rows in (np.arange(N) < 40, np.arange(N) % 30 > 4):
         rate = np.where(rows, RATE, np.nan)
         assert "nowhere are both known for 0.4 s on end" in remark(tmp_path, rate=rate)
     log = read(tmp_path, sine())
