@@ -17,6 +17,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.stages.push import Window
 
@@ -405,7 +406,7 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
+            values[role] = np.where(np.abs(floats) <= LARGEST, floats, np.nan) * factor + offset
     return values
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -193,7 +194,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
     estimates = {name: np.full(len(log), np.nan) for name in (*ESTIMATES, *extra_signals(observer))}
     for part in log.parts:
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
                 signals = replay_all(observer, log.trajectory(part))
         except Exception as error:  # a user's observer may fail in any way
             line = users_line(error.__traceback__)

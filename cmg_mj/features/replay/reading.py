@@ -30,7 +30,8 @@ from cmg_mj.features.replay.log import (
 )
 from cmg_mj.features.replay.noise import smallest_step, white_noise_of
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Push, Window, inside, push_windows
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.stages.push import Window, inside, push_windows
 
 SAME_PERIOD = 1e-3
 """Relative difference up to which the line through the rows has their period."""
@@ -150,11 +151,16 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
     """Read a run's own recording, whose columns, pushes and scenario are known."""
+    names = ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2", "x2_rad_s")
     try:
         trajectory = Trajectory.load(path)
         scenario = trajectory.metadata["scenario"]
-    except (InputError, LookupError) as error:
-        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
+        run = parse_scenario(dict(scenario), str(path))
+        columns = {name: trajectory[name] for name in names if not trajectory.axes}
+    except (LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: no recording of a run; say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
+        ) from error
     if trajectory.axes:
         raise InputError(
             f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; run it with the "
@@ -163,15 +169,18 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
-    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
+    time, dt = columns["time_s"], 1.0 / run.controller.rate_hz
+    with np.errstate(invalid="ignore"):
+        even = np.allclose(np.diff(time), dt, rtol=0.0, atol=EVEN * dt)
+    if not even:
+        raise InputError(f"{path}: time_s: its rows are not {dt:g} s apart, as controller.rate_hz has it")
     return Log(
         path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
-        1.0 / float(scenario["controller"]["rate_hz"]),
-        {**columns, REFERENCE: trajectory["x2_rad_s"]},
-        [slice(0, len(trajectory))],
+        dt,
+        {**columns, REFERENCE: columns.pop("x2_rad_s")},
+        [slice(0, len(time))],
         frozenset({"gimbals", "acceleration", "reference"}),
-        windows=_windows_inside(path, options.windows_s, trajectory["time_s"])
-        or push_windows([Push(**push) for push in scenario.get("push", ())]),
+        windows=_windows_inside(path, options.windows_s, time) or push_windows(run.push),
         scenario=scenario,
     )
 
