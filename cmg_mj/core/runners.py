@@ -82,7 +82,7 @@ class ObserverRunner:
         # Many worlds are judged one by one, elsewhere. Neither NaN nor a masked number is below infinity.
         if self._single and not abs(sum(estimates[0])) < math.inf:
             for name, value in zip(self._names(0), estimates[0], strict=True):
-                if not math.isfinite(value):
+                if np.ma.is_masked(value) or not math.isfinite(value):
                     name = f"{type(self.observers[0]).__name__} returned {value} for {name}"
                     raise RunStopped(f"observer {name} at t = {time:g} s")
         return estimates

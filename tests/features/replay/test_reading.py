@@ -16,7 +16,19 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
 from cmg_mj.features.replay.reading import read_log
-from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, read, sine, tilt, two_accelerometers, write_csv
+from tests.features.replay.motion import (
+    AMPLITUDE,
+    COLUMNS,
+    DT,
+    OMEGA,
+    N,
+    rate,
+    read,
+    sine,
+    tilt,
+    two_accelerometers,
+    write_csv,
+)
 
 T = DT * np.arange(N)
 ONE = {"time": "t_s", "tilt": "tilt_rad"}
@@ -450,3 +462,15 @@ def test_a_quote_that_swallows_rows_is_named(tmp_path: Path) -> None:
     for name in ("note", "t_s2"):
         with pytest.raises(InputError, match=f"a quote in column '{name}', about line 102, ends 195 lines later"):
             read(tmp_path, {**sine(), name: note})
+
+
+@pytest.mark.parametrize(("place", "size"), [("tilt_rad", 1e308), ("gyro_rad_s", 1e200), ("t_s", 3e307)])
+def test_a_number_beyond_all_sizes_is_none(place: str, size: float, tmp_path: Path) -> None:
+    """Squares of these overflow."""
+    columns = sine()
+    columns[place][1000] = size
+    log = read(tmp_path, columns)
+    assert np.isfinite(log["y1_rad"]).all()
+    np.testing.assert_allclose(np.nanmax(np.abs(log["reference_rad_s"])), AMPLITUDE * OMEGA, rtol=1e-3)
+    with pytest.raises(InputError, match="all that is needed|no number"):
+        read(tmp_path, {**columns, place: size * (1.0 + columns[place])})
