@@ -7,8 +7,9 @@ import math
 import mmap
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from datetime import datetime
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NamedTuple
 
@@ -258,10 +259,7 @@ _ASSIGNMENT = re.compile(
 
 
 _COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
-_DATE = (
-    r"^(?P<day>\d{4}-\d\d-\d\d)[Tt ](?P<clock>\d\d:\d\d:\d\d)(?:[.,](?P<fraction>\d+))?"
-    r" ?(?P<zone>[Zz]|UTC|[+-]\d\d(?::?\d\d)?)?$"
-)
+_ZONE = re.compile(r"\s+(Z|[+-]\d+:?\d*)$")
 
 
 class Column(NamedTuple):
@@ -395,7 +393,9 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
         numbers = table[headings.index(name.strip())]
         if role == "time" and pa.types.is_string(numbers.type):
-            numbers = _stamps(f"{path}: column {name!r}", numbers, options.decimal)
+            values[role] = _stamps(f"{path}: column {name!r}", numbers.to_pylist())
+            columns[role] = columns[role]._replace(unit="s")
+            continue
         if role == "time" and pa.types.is_timestamp(numbers.type):
             stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
             # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
@@ -417,9 +417,9 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     names, with or without its comment sign.
     """
     import pyarrow as pa
-    import pyarrow.compute as pc
     import pyarrow.csv as pacsv
 
+    pc: Any = import_module("pyarrow.compute")
     if "\0".encode(options.encoding) == b"\0":
         at = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ).find(b"\0")
         if at >= 0:
@@ -445,9 +445,16 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False, column_names=names, skip_rows=n_skipped)
     parse = pacsv.ParseOptions(delimiter=options.delimiter)
     kinds = dict.fromkeys(names, pa.binary())
-    kinds |= {column.name.strip(): pa.string() if role == "time" else pa.float64() for role, column in columns.items()}
+    kinds |= dict.fromkeys(wanted, pa.float64())
     convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds, strings_can_be_null=True)
-    table = pacsv.read_csv(file, read, parse, convert)
+    try:
+        table = pacsv.read_csv(file, read, parse, convert)
+    except pa.ArrowInvalid:
+        if "time" not in columns:
+            raise
+        file.seek(0)
+        convert.column_types = kinds | {columns["time"].name.strip(): pa.string()}  # its stamps may be dates
+        table = pacsv.read_csv(file, read, parse, convert)
     for name, cells in zip(names, table.columns, strict=True):
         if not pa.types.is_floating(cells.type) and (n_lines := pc.sum(pc.count_substring(cells, "\n")).as_py()):
             row = pc.index(pc.match_substring(cells, "\n"), True).as_py()
@@ -458,24 +465,19 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     return table
 
 
-def _stamps(name: str, text: pa.ChunkedArray, decimal: str) -> pa.ChunkedArray:
-    """Convert stamps to numbers, or to instants where they are ISO dates, with zones or without."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    text = pc.utf8_trim_whitespace(text)
-    with suppress(pa.ArrowInvalid):
-        return pc.replace_substring(text, decimal, ".").cast(pa.float64())
-    parts = pc.extract_regex(text, _DATE)
-    strange = pc.index(pc.and_(pc.is_valid(text), pc.is_null(parts)), True).as_py()
-    if strange >= 0:
-        raise InputError(
-            f"{name}: {shortened(text[strange].as_py())!r} in row {strange + 1} is not a number or an ISO date, as "
-            "2026-11-25T10:00:00.25Z is"
-        )
-    day, clock, fraction, zone = (pc.struct_field(parts, i) for i in range(4))
-    if len(set(pc.unique(pc.equal(zone, "")).drop_null().to_pylist())) > 1:
-        raise InputError(f"{name}: some stamps have a zone and some have none: write one for all, such as Z")
-    zone = pc.if_else(pc.match_substring_regex(zone, "^[+-]"), zone, "Z")
-    fraction = pc.utf8_slice_codeunits(pc.utf8_rpad(fraction, 9, "0"), 0, 9)
-    return pc.binary_join_element_wise(day, "T", clock, ".", fraction, zone, "").cast(pa.timestamp("ns", "UTC"))
+def _stamps(name: str, cells: Sequence[str | None]) -> np.ndarray:
+    """Convert ISO dates, all with a zone or all without, to seconds from the first; NaN where there is none."""
+    stamps = []
+    for row, cell in enumerate(cells, 1):
+        try:
+            stamps.append(cell and datetime.fromisoformat(_ZONE.sub(r"\1", cell.strip().upper().replace("UTC", "Z"))))
+        except ValueError as error:
+            raise InputError(
+                f"{name}: {shortened(str(cell))!r} in row {row} is not a number or an ISO date, as "
+                "2026-11-25T10:00:00.25Z is"
+            ) from error
+    try:
+        first = min(stamp for stamp in stamps if stamp)
+        return np.array([(stamp - first).total_seconds() if stamp else math.nan for stamp in stamps])
+    except TypeError as error:
+        raise InputError(f"{name}: some stamps have a zone and some have none: write one for all, such as Z") from error
