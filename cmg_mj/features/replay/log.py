@@ -392,15 +392,15 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
         if name.strip() not in headings:
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
         numbers = table[headings.index(name.strip())]
-        if role == "time" and pa.types.is_string(numbers.type):
-            values[role] = _stamps(f"{path}: column {name!r}", numbers.to_pylist())
+        is_text, is_date = pa.types.is_string(numbers.type), pa.types.is_timestamp(numbers.type)
+        if role == "time" and (is_text or is_date):
             columns[role] = columns[role]._replace(unit="s")
-            continue
-        if role == "time" and pa.types.is_timestamp(numbers.type):
+            if is_text:
+                values[role] = _stamps(f"{path}: column {name!r}", numbers.to_pylist())
+                continue
             stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
             # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
             values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
-            columns[role] = columns[role]._replace(unit="s")
             continue
         if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
             raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
