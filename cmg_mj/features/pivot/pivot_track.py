@@ -97,7 +97,7 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
     if len(wrong):
         raise InputError(
             f"{path}: sample {wrong[0] + 1}: {accelerations[wrong[0]]:g} m/s2 at {times[wrong[0]]:g} s: must be finite "
-            f"numbers, accelerations in m/s2 and at most {MAX_RECORDED_M_S2:g}"
+            f"numbers, accelerations in m/s2 and at most {MAX_RECORDED_M_S2:g}, times at most {MAX_TIME_S:g} s"
         )
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):
