@@ -124,9 +124,10 @@ def _status(arguments: Sequence[str]) -> Any:
         line = users_line(error.__traceback__)
         if line is None and isinstance(error, SystemExit):
             return error.code
-        if line is None:
+        if line is None and "MUJOCO_GL" not in str(error):
             raise
-        message = f"{line}: raised {raised(error)}"  # by a user's own code where nobody expects it to run
+        # By a user's own code where nobody expects it to run, or by the import of MuJoCo.
+        message = f"{line}: raised {raised(error)}" if line else f"{error}: unset it, or take egl, glfw or osmesa"
     note(message)
     return status
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -36,6 +35,7 @@ from cmg_mj.cli.terminal import (
 )
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.inputs.features import DRIVERS
+from cmg_mj.inputs.files import read_toml
 
 
 @click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
@@ -234,8 +234,8 @@ def _scenario_beside(model: Path) -> str:
     stem = place.name.removesuffix("_plugin")
     mounted = place.with_name(f"{stem}.xml") if stem != place.name else model
     for path in (model, mounted):
-        with suppress(OSError, ValueError, AttributeError):  # a scenario that cannot be read is none
-            scenario = tomllib.loads(path.with_suffix(".toml").read_text(encoding="utf-8"))
+        with suppress(InputError, AttributeError):  # a scenario that cannot be read is none
+            scenario = read_toml(path.with_suffix(".toml"), path.name)
             if scenario.get("plant", {}).get("model") == path.name:
                 return str(path.with_suffix(".toml"))
     return ""

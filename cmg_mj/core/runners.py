@@ -80,10 +80,10 @@ class ObserverRunner:
             _stop(self.observers[i], "observer", time, error)
         if not self._checked:
             self._check_shapes(estimates, y, time)
-        # Many worlds are judged one by one, elsewhere. NaN and infinity alike are not zero times themselves.
-        if self._single and 0.0 * sum(estimates[0]) != 0.0:
+        # Many worlds are judged one by one, elsewhere. Neither NaN nor a masked number is below infinity.
+        if self._single and not abs(sum(estimates[0])) < math.inf:
             for name, value in zip(self._names(0), estimates[0], strict=True):
-                if not math.isfinite(value):
+                if np.ma.is_masked(value) or not math.isfinite(value):
                     name = f"{type(self.observers[0]).__name__} returned {value} for {name}"
                     raise RunStopped(f"observer {name} at t = {time:g} s")
         return estimates
@@ -187,6 +187,8 @@ def check_shape(name: str, value: Scalar, y: Measurement) -> None:
         TypeError: It has another shape than the measurement.
     """
     number = np.asarray(value)
+    if np.ma.is_masked(value):
+        raise TypeError(f"{name} is masked")
     if number.shape != np.shape(y.y1) or number.dtype.kind not in "fiu":
         raise TypeError(f"{name} has shape {number.shape} of {number.dtype}, not {np.shape(y.y1)} of float64")
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from cmg_mj.core.errors import InputError, nearest
 
@@ -11,6 +13,8 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _INCLUDED = re.compile(r"""<(?:include|model)\b[^<>]*?\bfile\s*=\s*["']([^"']*)["']""")
 MAX_MODEL_BYTES = 50_000_000
+MAX_TOML_BYTES = 10_000_000
+"""A scenario or study is smaller; the longest scenario that a run writes has three thousand bytes."""
 
 
 def folder(name: str) -> Path:
@@ -88,8 +92,29 @@ def expanded(path: str | Path, option: str) -> Path:
         raise InputError(f"{option} {path}: no home folder is known of {Path(path).parts[0]}") from error
 
 
+def read_toml(path: Path, name: str) -> dict[str, Any]:
+    """Read the content of a TOML file that a user names.
+
+    Args:
+        path: The file.
+        name: What to call it in messages.
+
+    Raises:
+        InputError: The file is no TOML, or cannot be read.
+    """
+    text = read_text(path, name, MAX_TOML_BYTES)
+    if text.lstrip().startswith("<"):
+        raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{name}: not valid TOML: brackets in too many brackets") from error
+    except ValueError as error:  # a TOMLDecodeError, or a number of too many digits
+        raise InputError(f"{name}: not valid TOML: {error}") from error
+
+
 def read_text(path: Path, name: str, max_bytes: int) -> str:
-    """Read a text file that a user names, with or without a byte order mark.
+    """Read an ordinary text file that a user names, with or without a byte order mark.
 
     Args:
         path: The file.
@@ -97,9 +122,11 @@ def read_text(path: Path, name: str, max_bytes: int) -> str:
         max_bytes: The largest size that such a file has.
 
     Raises:
-        InputError: The file is larger, is no UTF-8 text, or cannot be read.
+        InputError: The file is larger, is no ordinary file or no UTF-8 text, or cannot be read.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{name}: is no ordinary file")
         if path.stat().st_size > max_bytes:
             raise InputError(f"{name}: larger than {max_bytes // 1_000_000} MB")
         return path.read_text(encoding="utf-8-sig")

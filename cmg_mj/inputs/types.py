@@ -75,6 +75,8 @@ Duration = Annotated[float, Field(gt=0.0, le=MAX_TIME_S)]
 """A time that passes [s]."""
 Instant = Annotated[float, Field(ge=0.0, le=MAX_TIME_S)]
 """A time after the start, or a delay [s]."""
+Latency = Annotated[float, Field(ge=0.0, le=1.0)]
+"""A sensor's delay [s]: a rig has fallen before a longer one."""
 GridDuration = Annotated[Duration, OnGrid("s")]
 """A time that passes in whole physics steps [s]."""
 GridInstant = Annotated[Instant, OnGrid("s")]

@@ -210,7 +210,7 @@ def _is_alive(process: int) -> bool:
 def _text(path: Path) -> str | None:
     """Read a text file; None where there is none."""
     try:
-        return path.read_text(encoding="utf-8", errors="surrogateescape")
+        return path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else None
     except OSError:
         return None
 
@@ -234,7 +234,11 @@ def signed(text: str, ending: str) -> bytes:
 
 def is_signed(path: Path) -> bool:
     """Return whether a file begins with the line that `signed` puts there."""
-    return path.is_file() and not path.is_symlink() and path.read_bytes().startswith(signed("", path.suffix))
+    if not path.is_file() or path.is_symlink():
+        return False
+    line = signed("", path.suffix)
+    with path.open("rb") as file:
+        return file.read(len(line)) == line
 
 
 METADATA_KEY = b"cmg_mj"

@@ -277,8 +277,9 @@ class Trajectory(NamedColumns):
         try:
             stored = json.loads((table.schema.metadata or {})[METADATA_KEY])
             layout = TypeAdapter(Layout).validate_python(stored.pop("layout"))
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            columns = {name: table[name].cast(pa.float64()).to_numpy() for name in table.column_names}
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError, pa.ArrowException) as error:
             raise InputError(
                 f"{path}: a Parquet file, but no trajectory of this version of cmg-mj; run its scenario.toml again"
             ) from error
-        return Trajectory({name: table[name].to_numpy() for name in table.column_names}, stored, layout)
+        return Trajectory(columns, stored, layout)

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cmg_mj.core.errors import InputError
 from cmg_mj.inputs.features import FEATURES
-from cmg_mj.inputs.files import bundled, find, folder, read_text
+from cmg_mj.inputs.files import bundled, find, folder, read_toml
 from cmg_mj.inputs.overrides import override
 from cmg_mj.scenario.schema import Scenario, parse_scenario
-
-MAX_BYTES = 1_000_000
-"""A scenario file is smaller; the longest that a run writes has three thousand bytes."""
 
 
 def load_scenario(
@@ -36,7 +31,7 @@ def load_scenario(
         InputError: The file does not exist, is no TOML, or has a field that is unknown or not allowed.
     """
     path = find("scenarios", name, ".toml", "scenario")
-    fields = _read(path, name) if fields is None else fields
+    fields = read_toml(path, name) if fields is None else fields
     if path.stem in bundled("scenarios"):
         fields.setdefault("based_on", path.stem)
     changes, names = [], []
@@ -77,17 +72,6 @@ def _kind_of(fields: Mapping[str, Any], section: str, usual: Any = None) -> Any:
     usual = usual or getattr(Scenario(), section).kind
     parts = fields.get(section, {})
     return parts.get("kind", usual) if isinstance(parts, Mapping) else None
-
-
-def _read(path: Path, name: str) -> dict[str, Any]:
-    """Read the content of a TOML file."""
-    text = read_text(path, name, MAX_BYTES)
-    if text.lstrip().startswith("<"):
-        raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
-    try:
-        return tomllib.loads(text)
-    except ValueError as error:  # a TOMLDecodeError, or a number of too many digits
-        raise InputError(f"{name}: not valid TOML: {error}") from error
 
 
 def base_of(scenario: Scenario) -> Scenario | None:

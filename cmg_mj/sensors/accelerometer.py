@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.sensor import SampledSensor, Site, shown
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces
-from cmg_mj.inputs.types import STRICT, Instant, NonNegative, Rate
+from cmg_mj.inputs.types import STRICT, Latency, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
 from cmg_mj.stages.low_pass import LowPass, LowPassSettings
 from cmg_mj.stages.mounting_errors import PERFECT, MountingErrorsSettings, mounting_errors
@@ -78,7 +78,7 @@ class Encoder:
 
     rate_hz: Rate = 200.0
     counts_per_revolution: NonNegative = 4096.0
-    latency_s: Instant = 0.0
+    latency_s: Latency = 0.0
 
     @property
     def resolution(self) -> float:

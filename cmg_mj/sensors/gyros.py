@@ -15,7 +15,7 @@ from cmg_mj.core.arrays import Scalar, clip, digitise, radians
 from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream
 from cmg_mj.core.sensor import SampledSensor, Site
 from cmg_mj.core.types import IdealReading
-from cmg_mj.inputs.types import STRICT, Batched, Instant, NonNegative, Positive, Rate
+from cmg_mj.inputs.types import STRICT, Batched, Latency, NonNegative, Positive, Rate
 
 PIECE = 1000
 """Samples before the run that are made together, whatever the rate."""
@@ -174,7 +174,7 @@ class Fog:
     bias_deg_h: float = 0.0
     bandwidth_hz: NonNegative = 440.0
     range_deg_s: Positive = 490.0
-    latency_s: Instant = 0.0
+    latency_s: Latency = 0.0
 
     @property
     def white_noise_sigma(self) -> float:

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
-from cmg_mj.inputs.types import STRICT, Batched, Instant, NoiseSize, NonNegative, Positive, Rate
+from cmg_mj.inputs.types import STRICT, Batched, Latency, NoiseSize, NonNegative, Positive, Rate
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -32,7 +32,7 @@ class PairSettings:
     bias_mg: Annotated[tuple[float, float], Batched()] = (0.0, 0.0)
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
-    latency_s: Instant = 0.0
+    latency_s: Latency = 0.0
 
     inside_hz = 0.0
     """Samples a second that the part takes; 0: as many as it delivers."""

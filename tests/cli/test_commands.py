@@ -295,3 +295,15 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else() -> None:
     silent = cmg_mj("run", "long.toml", "--json")
     assert (silent.status, silent.err) == (0, "")
     assert silent.out == process.stdout
+
+
+def test_an_unknown_way_of_rendering_is_one_line() -> None:
+    """Where MuJoCo is imported first, in a process of its own."""
+    unknown = {**os.environ, "MUJOCO_GL": "bogus"}
+    process = subprocess.run(
+        [*COMMAND, "check", "push_recovery"], capture_output=True, text=True, env=unknown, check=False
+    )
+    assert process.returncode == 2
+    assert process.stderr.splitlines() == [
+        "cmg-mj: invalid value for environment variable MUJOCO_GL: bogus: unset it, or take egl, glfw or osmesa"
+    ]

@@ -58,6 +58,8 @@ ReturnsText = estimating("ReturnsText", lambda k, y, rate: (y.y1, rate, "0.0"))
 ForgetsWorlds = estimating("ForgetsWorlds", lambda k, y, rate: (y.y1, 0.0, y.y2))
 FailsLater = estimating("FailsLater", lambda k, y, rate: 1 / 0 if k == 30 else (y.y1, rate, y.y2))
 GivesNan = estimating("GivesNan", lambda k, y, rate: (y.y1, rate * (math.nan if k >= 30 else 1.0), y.y2))
+IsMasked = estimating("IsMasked", lambda k, y, rate: (y.y1, np.ma.masked, y.y2))
+IsMaskedLater = estimating("IsMaskedLater", lambda k, y, rate: (y.y1, np.ma.masked if k >= 30 else rate, y.y2))
 
 
 class OwesASignal(Mine):
@@ -156,6 +158,7 @@ def with_part(part: type, *settings: str, field: str = "") -> Experiment:
         (ReturnsNothing, 1, ["observer ReturnsNothing", "TypeError"]),
         (ReturnsTwo, 1, ["observer ReturnsTwo", "2", "x1, x2, x3"]),
         (ReturnsText, 2, ["observer ReturnsText", "x3", "<U"]),
+        (IsMasked, 1, ["observer IsMasked", "x2 is masked"]),
         (OwesASignal, 2, ["observer OwesASignal", "3", "bias_rad"]),
         (LawReturnsNothing, 1, ["law LawReturnsNothing", "TypeError"]),
         (LawReturnsAList, 1, ["law LawReturnsAList", "u", "(1,)", "()"]),
@@ -177,6 +180,7 @@ def test_what_has_a_wrong_shape_ends_the_run_at_its_first_tick(part: type, world
     [
         (FailsLater, "ZeroDivisionError: division by zero"),
         (GivesNan, "observer GivesNan returned nan for x2"),
+        (IsMaskedLater, "observer IsMaskedLater returned -- for x2"),
         (LawFailsLater, "ZeroDivisionError: division by zero"),
         (LawGivesInfinity, "law LawGivesInfinity returned inf for u"),
     ],

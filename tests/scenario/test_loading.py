@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,13 @@ import pytest
 import tomli_w
 
 from cmg_mj import Estimate, InputError, Measurement, load_scenario, parse_scenario, prepare
+from cmg_mj.features.sweeps.chunks import Store
+from cmg_mj.features.sweeps.study import SweepStudy, parse_axis
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.laws.state_feedback import TABLE_2_GAINS
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.scenario.schema import Scenario
+from tests.command import cmg_mj
 from tests.run_folders import write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -220,3 +225,44 @@ def test_of_gains_and_weights_the_one_set_replaces_the_files(tmp_path: Path) -> 
     assert controller.lqr is not None
     with pytest.raises(InputError, match="give either gains or lqr, not both"):
         load_scenario(str(path), [weights, "controller.gains=scaled"])
+
+
+# --- files that are none -------------------------------------------------------------------------------------
+
+
+def _sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(3_000_000_000)
+
+
+STRANGE: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a FIFO": (lambda path: os.mkfifo(path), "no ordinary file"),
+    "a device": (lambda path: path.symlink_to("/dev/zero"), "no ordinary file"),
+    "many brackets": (lambda path: path.write_text("a=" + "[" * 5000), "not valid TOML: "),
+    "3 GB": (_sparse, "larger than 10 MB"),
+    "no UTF-8": (lambda path: path.write_bytes(b"a = '\xff'"), "not UTF-8 text"),
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no FIFO")
+@pytest.mark.parametrize("kind", STRANGE)
+def test_a_strange_file_is_refused_in_a_line(kind: str) -> None:
+    """As a scenario, and as a study; beside a model, it is no scenario."""
+    make, words = STRANGE[kind]
+    copy_models(".")
+    make(Path("scissored_pair.toml"))
+    for command in ("check", "sweep"):
+        assert words in cmg_mj(command, "scissored_pair.toml").complaint
+    assert "run push_recovery --set plant.model" in cmg_mj("check", "scissored_pair.xml").out
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no FIFO")
+@pytest.mark.parametrize("kind", [*STRANGE, "a text"])
+def test_a_strange_study_in_a_folder_is_not_ours(kind: str) -> None:
+    Path("sweep").mkdir()
+    make, _ = STRANGE.get(kind, (lambda path: path.write_text('scenario = "x"'), ""))
+    make(Path("sweep/study.toml"))
+    study = SweepStudy(
+        load_scenario("push_recovery"), (parse_axis("plant.equilibrium_bias_deg", "0,1", ""),), ("linear",), 1
+    )
+    assert Store.open(Path("sweep"), study).folder == Path("sweep-2")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
@@ -111,6 +112,10 @@ class ProcessorController(Controller):
         x_e = trim.gain * decision.estimate[trim.part] if trimmed else decision.x_e
         if is_first and not trimmed and tick.x_e:  # the processor's law has begun in this update
             x_e = tick.x_e
+        if not math.isfinite(decision.u) or (math.isfinite(tick.x_e) and not math.isfinite(x_e)):
+            raise RunStopped(
+                f"the processor answered u = {decision.u:g}, x_e = {x_e:g} at t = {step * self.timestep:g} s"
+            )
         self.tick = tick._replace(
             u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
         )

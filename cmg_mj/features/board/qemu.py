@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import shutil
 import socket
 import struct
@@ -159,6 +160,8 @@ class Board:
     def _ask(self, kind: str, payload: bytes, layout: str) -> tuple:
         """Send a message, as firmware/board.c describes it, and receive the numbers of its answer."""
         try:
+            while select.select([self._line], [], [], 0.0)[0] and self._line.recv(4096):
+                pass  # what was sent before the question is no answer
             self._line.sendall(kind.encode() + payload)
         except OSError as error:
             raise RunStopped(f"the board is gone: {self._exit_message()}") from error

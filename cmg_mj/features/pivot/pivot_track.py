@@ -14,6 +14,8 @@ from cmg_mj.inputs.files import require_file
 
 MAX_RECORDED_M_S2 = 1000.0
 """A track with a larger acceleration is in another unit [m/s^2]."""
+MAX_TIME_S = 1e12
+"""Largest time of a track; dates in seconds are smaller [s]."""
 
 
 class Track(NamedTuple):
@@ -91,11 +93,11 @@ def _read_track(path: Path, column: str | None, _changed_ns: int, _size: int) ->
         raise InputError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from error
     if len(times) < 2:
         raise InputError(f"{path}: too few samples ({len(times)}); a track has at least two")
-    wrong = np.flatnonzero(~(np.isfinite(times) & (np.abs(accelerations) <= MAX_RECORDED_M_S2)))
+    wrong = np.flatnonzero(~((np.abs(times) <= MAX_TIME_S) & (np.abs(accelerations) <= MAX_RECORDED_M_S2)))
     if len(wrong):
         raise InputError(
             f"{path}: sample {wrong[0] + 1}: {accelerations[wrong[0]]:g} m/s2 at {times[wrong[0]]:g} s: must be finite "
-            f"numbers, accelerations in m/s2 and at most {MAX_RECORDED_M_S2:g}"
+            f"numbers, accelerations in m/s2 and at most {MAX_RECORDED_M_S2:g}, times at most {MAX_TIME_S:g} s"
         )
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if len(back):

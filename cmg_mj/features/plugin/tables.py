@@ -107,7 +107,7 @@ def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix
         "LIBRARY": library_name(name),
         "TILT_IN_C": c_text(tilt),
         "TILT_IN_PYTHON": json.dumps(tilt, ensure_ascii=False),
-        "MUJOCO": str(mujoco.parent),
+        "MUJOCO": shlex.quote(str(mujoco.parent)).replace("$", "$$"),
         "LIBMUJOCO": mujoco.name,
         "SOURCES": " ".join(sources),
         "INCLUDED": " ".join(file for file in code if file not in sources),

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import mmap
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
+from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.stages.push import Window
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
@@ -250,6 +258,10 @@ _ASSIGNMENT = re.compile(
 """ROLE=HEADING or ROLE="HEADING"; the heading ends at a comma before another ROLE=, a quoted one at its quote."""
 
 
+_COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
+_ZONE = re.compile(r"\s+(Z|[+-]\d+:?\d*)$")
+
+
 class Column(NamedTuple):
     """One column of a file: its heading, its unit, and factor and addend that convert it to SI units and radians."""
 
@@ -358,23 +370,17 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
         first, the unit that their column then has.
     """
     import pyarrow as pa
-    import pyarrow.csv as pacsv
     import pyarrow.parquet as pq
 
     try:
         with path.open("rb") as file:
             is_parquet = file.read(4) == b"PAR1"
             file.seek(0)
-            if is_parquet:
-                table = pq.read_table(file)
-            else:
-                read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False)
-                parse = pacsv.ParseOptions(delimiter=options.delimiter)
-                kinds = {column.name: pa.float64() for role, column in columns.items() if role != "time"}
-                convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds)
-                table = pacsv.read_csv(file, read, parse, convert)
+            table = pq.read_table(file) if is_parquet else _read_csv(path, file, columns, options)
         headings = [heading.strip() for heading in table.column_names]
-    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError) as error:
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, TypeError) as error:
         text = shortened(" ".join(str(error).split()))
         raise InputError(
             f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
@@ -386,15 +392,92 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
         if name.strip() not in headings:
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
         numbers = table[headings.index(name.strip())]
-        if role == "time" and pa.types.is_timestamp(numbers.type):
+        is_text, is_date = pa.types.is_string(numbers.type), pa.types.is_timestamp(numbers.type)
+        if role == "time" and (is_text or is_date):
+            columns[role] = columns[role]._replace(unit="s")
+            if is_text:
+                values[role] = _stamps(f"{path}: column {name!r}", numbers.to_pylist())
+                continue
             stamps = numbers.cast(pa.timestamp("ns", numbers.type.tz)).to_numpy()
             # Nanoseconds are subtracted as integers: a double has a quarter of a microsecond in 2026.
             values[role] = (stamps - np.fmin.reduce(stamps)) / np.timedelta64(1, "ns") * 1e-9
-            columns[role] = columns[role]._replace(unit="s")
             continue
         if not any(check(numbers.type) for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_null)):
             raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.isfinite(floats), floats, np.nan) * factor + offset
+            values[role] = np.where(np.abs(floats) <= LARGEST, floats, np.nan) * factor + offset
     return values
+
+
+def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options: ReadOptions) -> pa.Table:
+    """Read a CSV: numbers of the columns, text of the time and of all others.
+
+    The heading is the line, among the comments at the beginning and the first other one, that has most of the columns'
+    names, with or without its comment sign.
+    """
+    import pyarrow as pa
+    import pyarrow.csv as pacsv
+
+    pc: Any = import_module("pyarrow.compute")
+    if "\0".encode(options.encoding) == b"\0":
+        at = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ).find(b"\0")
+        if at >= 0:
+            raise InputError(
+                f"{path}: byte {at:,} is NUL, as where a power cut ended a file; delete such bytes, as with "
+                "tr -d '\\0' < LOG > CLEAN"
+            )
+    beginning: list[str] = []
+    with path.open(encoding=options.encoding, errors="replace") as lines:
+        for line in lines:
+            beginning.append(line.lstrip("\ufeff"))
+            if line.strip() and not _COMMENT.match(line):
+                break
+    last, most = len(beginning) - 1, -2
+    wanted, names = {column.name.strip() for column in columns.values()}, [""]
+    n_skipped = 0
+    for number, line in reversed(list(enumerate(beginning))):
+        for text in (_COMMENT.sub("", line), line):
+            cells = [cell.strip() for cell in next(csv.reader([text], delimiter=options.delimiter))]
+            found = len(wanted.intersection(cells)) - "".join(cells).startswith(tuple("+-.0123456789"))
+            if cells and found > most:
+                most, names, n_skipped = found, cells, max(number + 1, last + (number == last))
+    read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False, column_names=names, skip_rows=n_skipped)
+    parse = pacsv.ParseOptions(delimiter=options.delimiter)
+    kinds = dict.fromkeys(names, pa.binary())
+    kinds |= dict.fromkeys(wanted, pa.float64())
+    convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds, strings_can_be_null=True)
+    try:
+        table = pacsv.read_csv(file, read, parse, convert)
+    except pa.ArrowInvalid:
+        if "time" not in columns:
+            raise
+        file.seek(0)
+        convert.column_types = kinds | {columns["time"].name.strip(): pa.string()}  # its stamps may be dates
+        table = pacsv.read_csv(file, read, parse, convert)
+    for name, cells in zip(names, table.columns, strict=True):
+        if not pa.types.is_floating(cells.type) and (n_lines := pc.sum(pc.count_substring(cells, "\n")).as_py()):
+            row = pc.index(pc.match_substring(cells, "\n"), True).as_py()
+            raise InputError(
+                f"{path}: a quote in column {name!r}, about line {n_skipped + row + 1}, ends {n_lines:,} lines later, "
+                "which are lost: delete the quotes"
+            )
+    return table
+
+
+def _stamps(name: str, cells: Sequence[str | None]) -> np.ndarray:
+    """Convert ISO dates, all with a zone or all without, to seconds from the first; NaN where there is none."""
+    stamps = []
+    for row, cell in enumerate(cells, 1):
+        try:
+            stamps.append(cell and datetime.fromisoformat(_ZONE.sub(r"\1", cell.strip().upper().replace("UTC", "Z"))))
+        except ValueError as error:
+            raise InputError(
+                f"{name}: {shortened(str(cell))!r} in row {row} is not a number or an ISO date, as "
+                "2026-11-25T10:00:00.25Z is"
+            ) from error
+    try:
+        first = min(stamp for stamp in stamps if stamp)
+        return np.array([(stamp - first).total_seconds() if stamp else math.nan for stamp in stamps])
+    except TypeError as error:
+        raise InputError(f"{name}: some stamps have a zone and some have none: write one for all, such as Z") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,7 +17,7 @@ from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
-from cmg_mj.features.replay.reference import Alignment, alignment_of
+from cmg_mj.features.replay.reference import SPAN_S, Alignment, alignment_of
 from cmg_mj.features.replay.scores import rms, scores
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
@@ -176,8 +177,11 @@ def _ready(
             OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
             left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
             continue
+        own, start = dict(parameters.get(name, {})), OBSERVER_CLASSES.takes(name).get("rate_start")
+        if start is not None and log.scenario is None:  # a log may begin in the middle of a motion
+            own.setdefault("rate_start", max(start.default, _rate_of(log)))
         try:
-            ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **parameters.get(name, {}))
+            ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **own)
         except InputError as error:
             if name in parameters:
                 raise
@@ -188,12 +192,19 @@ def _ready(
     return ready, left_out
 
 
+def _rate_of(log: Log) -> float:
+    """Return the RMS of the tilt's mean rate over `SPAN_S` [rad/s]."""
+    span = max(1, round(SPAN_S / log.dt))
+    rises = [log["y1_rad"][part][span:] - log["y1_rad"][part][:-span] for part in log.parts]
+    return (rms(np.concatenate(rises)) or 0.0) / (span * log.dt)
+
+
 def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
     """Return the observer's estimates, part by part, NaN outside; or how it failed."""
     estimates = {name: np.full(len(log), np.nan) for name in (*ESTIMATES, *extra_signals(observer))}
     for part in log.parts:
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
                 signals = replay_all(observer, log.trajectory(part))
         except Exception as error:  # a user's observer may fail in any way
             line = users_line(error.__traceback__)

@@ -91,7 +91,7 @@ def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> Log
         rows = slice(start, start + BLOCK)
         places = (segment.placed[rows] - segment.placed[start]) / period
         values = {name: column[rows] for name, column in segment.rows.items()}
-        steps.append([_smallest_step(values[name]) for name in names])
+        steps.append([smallest_step(values[name]) for name in names])
         sizes.append([float(np.std(values[name])) for name in names])
         if len(names) > 1 and "u_rad_s" in values:
             places, values = _without_response(places, values)
@@ -109,10 +109,10 @@ def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> Log
     return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
 
 
-def _smallest_step(values: np.ndarray) -> float:
+def smallest_step(values: np.ndarray) -> float:
     """Return the smallest distance of two different values."""
     steps = np.diff(np.sort(values))
-    steps = steps[steps > 1e-9 * np.ptp(values)]
+    steps = steps[steps > 1e-9 * steps.sum()]
     return float(steps.min()) if len(steps) else math.inf
 
 

@@ -20,6 +20,7 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
+    Column,
     Log,
     ReadOptions,
     Segment,
@@ -27,14 +28,21 @@ from cmg_mj.features.replay.log import (
     columns_of,
     read_table,
 )
-from cmg_mj.features.replay.noise import white_noise_of
+from cmg_mj.features.replay.noise import smallest_step, white_noise_of
 from cmg_mj.results.trajectory import Trajectory
-from cmg_mj.stages.push import Push, Window, inside, push_windows
+from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.stages.push import Window, inside, push_windows
 
 SAME_PERIOD = 1e-3
 """Relative difference up to which the line through the rows has their period."""
 GAP_PERIODS = 1.5
 """A gap is longer than so many periods."""
+PACKET = 1.75
+"""Rows with longer usual steps between them, in their mean, come in packets: what is between is not known."""
+LOST = 1.25
+"""Mean step, in periods, up to which single rows are lost."""
+PAUSE = 3.0
+"""Longer steps, in usual ones between packets, are pauses."""
 MIN_SAMPLES = 20
 """A segment with fewer samples is discarded."""
 BRIDGED = 5
@@ -52,6 +60,12 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
+CLIPPED = 5
+"""Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
+STEEP = 32.0
+"""Fall in two rows beside them, in smallest steps by rows (up to ten): a parabola in steps falls by 16."""
+REST = 0.05
+"""A tilt that stands while its rate is below this share of its largest is at rest."""
 MAX_DELAY_S = 1e6
 """Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
@@ -100,6 +114,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
+    clipped = _clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
@@ -107,7 +122,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if np.ptp(tilt) == 0.0:
         raise InputError(f"{path}: the tilt is {tilt[0]:g} rad in every row: nothing moves")
     if "rate" in signals:
-        reference = joined[REFERENCE] = _reference(segments, time, signals["rate"], options.delay_s)
+        unclipped = np.where(clipped, np.nan, signals["rate"])
+        reference = joined[REFERENCE] = _reference(segments, time, unclipped, options.delay_s)
         known = reference[np.isfinite(reference)]
         if not len(known):
             raise InputError(f"{path}: the reference has no number where the tilt has one")
@@ -135,11 +151,16 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
 
 def _read_run(path: Path, options: ReadOptions) -> Log:
     """Read a run's own recording, whose columns, pushes and scenario are known."""
+    names = ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2", "x2_rad_s")
     try:
         trajectory = Trajectory.load(path)
         scenario = trajectory.metadata["scenario"]
-    except (InputError, LookupError) as error:
-        raise InputError(f"{path}: say which columns are what, --columns tilt=HEADING,rate=HEADING,...") from error
+        run = parse_scenario(dict(scenario), str(path))
+        columns = {name: trajectory[name] for name in names if not trajectory.axes}
+    except (LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: no recording of a run; say which columns are what, --columns tilt=HEADING,rate=HEADING,..."
+        ) from error
     if trajectory.axes:
         raise InputError(
             f"{path}: a run about several axes ({', '.join(trajectory.axes)}), and replay takes one; run it with the "
@@ -148,15 +169,18 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
     given = [field for field in options.as_toml() if field != "windows_s"]
     if given:
         raise InputError(f"{path}: {given[0]} is for other logs than a run's own recording; read it with --columns")
-    columns = {name: trajectory[name] for name in ("time_s", "y1_rad", "y2_rad", "u_rad_s", "acceleration_rad_s2")}
+    time, dt = columns["time_s"], 1.0 / run.controller.rate_hz
+    with np.errstate(invalid="ignore"):
+        even = np.allclose(np.diff(time), dt, rtol=0.0, atol=EVEN * dt)
+    if not even:
+        raise InputError(f"{path}: time_s: its rows are not {dt:g} s apart, as controller.rate_hz has it")
     return Log(
         path.parent.name if path.stem == "trajectory" and path.parent.name else path.stem,
-        1.0 / float(scenario["controller"]["rate_hz"]),
-        {**columns, REFERENCE: trajectory["x2_rad_s"]},
-        [slice(0, len(trajectory))],
+        dt,
+        {**columns, REFERENCE: columns.pop("x2_rad_s")},
+        [slice(0, len(time))],
         frozenset({"gimbals", "acceleration", "reference"}),
-        windows=_windows_inside(path, options.windows_s, trajectory["time_s"])
-        or push_windows([Push(**push) for push in scenario.get("push", ())]),
+        windows=_windows_inside(path, options.windows_s, time) or push_windows(run.push),
         scenario=scenario,
     )
 
@@ -195,6 +219,34 @@ def _times(
     if not rows.any():
         raise InputError(f"--time-range {start:g}:{end:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s")
     return counted[: rows.sum()] if time is None else time[rows], _select(signals, rows)
+
+
+def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
+    """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
+
+    A signal that comes to its end quickly, stays, and leaves quickly is clipped. A quantised one turns in few steps.
+    """
+    clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
+    rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
+    for role, values in signals.items():
+        if role == "command" or role.startswith("gimbal"):
+            continue  # which stand at their ends by right
+        (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
+        steep = STEEP * smallest_step(values[np.isfinite(values)])
+        for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
+            n_rows, at_end = 0, values == end
+            for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
+                fall = np.fmin.reduce(np.abs(around[[start, stop + 3]] - end))
+                rests = role == "tilt" and np.median(rate[start:stop]) < REST * np.fmax.reduce(rate)
+                if stop - start > 2 and fall * min(stop - start, 10) > steep and not rests:
+                    n_rows += stop - start
+            if n_rows >= CLIPPED:
+                clipped |= at_end
+                notes.append(
+                    f"{at_end.sum():,} rows of {name!r} stand at the same {word} value, {(end - offset) / factor:.6g}: "
+                    "its sensor is clipped there, and the reference is not compared"
+                )
+    return clipped
 
 
 def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
@@ -249,7 +301,14 @@ def _sample(
     """
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
-    period = float(steps[steps <= GAP_PERIODS * float(np.median(steps))].mean())
+    period, between = _pace(steps)
+    gap = GAP_PERIODS * period
+    cure = f"leave time out and give --rate {1.0 / period:.4g}"
+    if between > PACKET * period:
+        raise InputError(
+            f"{path}: its rows come in packets, {1e3 * np.median(steps[steps < period]):.4g} ms apart with "
+            f"{1e3 * between:.4g} ms between, so their times are not those of the measurements: {cure}"
+        )
     if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / slowest:
         raise InputError(
             f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
@@ -260,16 +319,18 @@ def _sample(
         period = 1.0 / round_rate
     dt = period if options.rate_hz is None else 1.0 / options.rate_hz
     max_gap = BRIDGED * period if options.max_gap_s is None else options.max_gap_s
-    gaps = steps > GAP_PERIODS * period
-    divided = steps > max(GAP_PERIODS * period, max_gap + period)
+    gaps = steps > gap
+    divided = steps > max(gap, max_gap + period)
     stretches = [slice(start, end) for start, end in pairwise([0, *(np.flatnonzero(divided) + 1), len(time)])]
     resolution = _resolution(time)
     even = all(_is_even(time[rows], period, resolution) for rows in stretches)
+    even &= not between or steps.max() <= period + resolution
     resampled = not even or abs(dt - period) > 1e-6 * dt
-    shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), steps[~gaps].max()))
+    shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), max(between, steps[~gaps].max())))
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
-        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines")
+        own = f"; if they were measured evenly, {cure}" if between else ""
+        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
         notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
     for what, which in (
@@ -285,7 +346,7 @@ def _sample(
     if sum(lengths) > MAX_SAMPLES:
         raise InputError(f"{path}: {sum(lengths):,.0f} samples at {1.0 / dt:g} Hz; at most {MAX_SAMPLES:,}")
     segments = [
-        _segment(time[rows], _select(values, rows), period, dt, resampled)
+        _segment(time[rows], _select(values, rows), gap, dt, resampled)
         for rows, length in zip(stretches, lengths, strict=True)
         if length >= MIN_SAMPLES - 1.5
     ]
@@ -296,6 +357,24 @@ def _sample(
     if len(segments) < len(stretches):
         notes.append(f"{len(stretches) - len(segments)} parts with fewer than {MIN_SAMPLES} samples discarded")
     return period, dt, segments
+
+
+def _pace(steps: np.ndarray) -> tuple[float, float]:
+    """Return the period of rows, and the usual step between packets of them, or 0 [s].
+
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost. Otherwise long
+    and short steps take turns, and the period is their mean, from the first packet to the last.
+    """
+    period = float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
+    longer = steps > GAP_PERIODS * period
+    if longer.sum() > max(4.0, steps[~longer].sum()):
+        between = float(np.median(steps[longer]))
+        first, *_, last = np.flatnonzero(longer) + 1
+        whole = steps[first:last]
+        mean = float(whole[whole < PAUSE * between].mean())
+        if mean > LOST * period or longer.mean() > LOST - 1.0:
+            return mean, between
+    return period, 0.0
 
 
 def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) -> tuple[np.ndarray, Values]:
@@ -319,9 +398,10 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         )
     again = steps <= SAME_TIME * np.median(steps)
     if again.mean() > FEW_REPEATED:
+        rate = "HZ" if again.all() else f"{np.argmax(time == time[-1]) / (time[-1] - time[0]):.4g}"
         raise InputError(
             f"{path}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps are too "
-            "coarse; leave time out and give --rate"
+            f"coarse; leave time out and give --rate {rate}"
         )
     if again.any():
         rows, first = _counted(again.sum(), "row"), time[1:][again][0]
@@ -331,9 +411,9 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     return time, values
 
 
-def _segment(time: np.ndarray, values: Values, period: float, dt: float, resampled: bool) -> Segment:
+def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled: bool) -> Segment:
     """Sample rows without a gap every dt."""
-    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=GAP_PERIODS * period)
+    stamps, placed, interpolate = time - time[0], time, partial(_resample, gap=gap)
     places = np.arange(int(stamps[-1] / dt + 1e-6) + 1)
     if not resampled:
         # Rows stay where they are, and those that are missing come between them.
@@ -413,7 +493,8 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
     sampled = []
     for segment in segments:
         grid, stamps = segment.time, segment.when(time) - delay_s
-        gap = GAP_PERIODS * float(np.median(np.diff(stamps)))
+        period, between = _pace(np.diff(stamps))
+        gap = (2.0 if between else GAP_PERIODS) * period
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)
         before, later = grid - stamps[after - 1], stamps[after] - grid

@@ -141,7 +141,10 @@ def judge(log: Log, aligned: Alignment) -> str:
     """
     lag, scale, offset, correlation, *errors = aligned
     if scale is None or offset is None or correlation is None:
-        return "The reference cannot be compared with the tilt: too little motion, or too short."
+        length = 2 * round(SPAN_S / log.dt) + 1
+        known = (np.convolve(np.isfinite(log[REFERENCE][part]), np.ones(length)).max() for part in log.parts)
+        why = "too little motion" if max(known) >= length else f"nowhere are both known for {2 * SPAN_S:g} s on end"
+        return f"The reference cannot be compared with the tilt: {why}."
     lag_error, scale_error, offset_error = (math.inf if error is None else error for error in errors)
     options = log.options
     scale_set, offset_set = options.scale.get("rate", 1.0), options.offset.get("rate", 0.0)

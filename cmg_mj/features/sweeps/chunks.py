@@ -20,7 +20,7 @@ import tomli_w
 
 from cmg_mj.core.errors import InputError, RunStopped, raised
 from cmg_mj.features.sweeps.study import CHUNK, MAX_TRIALS, SweepStudy, Trial, varied_tracks
-from cmg_mj.inputs.files import find, model_files
+from cmg_mj.inputs.files import find, model_files, read_toml
 from cmg_mj.results.folder import is_own, numbered, whole_file, write_marker
 from cmg_mj.results.summary_keys import ID_COLUMNS, KEYS, Summary, SummaryValue
 from cmg_mj.runs.batch import BatchKey
@@ -350,10 +350,10 @@ def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
     """Return whether a folder is new, empty, or this sweep's, versions apart; one that may be replaced is removed."""
     if folder.is_dir():
         try:
-            there = tomllib.loads((folder / STUDY).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            there = read_toml(folder / STUDY, STUDY)
+            there["scenario"] = {**there["scenario"], "versions": fields["scenario"]["versions"]}
+        except (InputError, KeyError, TypeError):
             there = {}
-        there["scenario"] = {**there.get("scenario", {}), "versions": fields["scenario"]["versions"]}
         if not any(folder.iterdir()) or there == fields:
             return True
     if overwrite and is_own(folder):

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
-from cmg_mj.inputs.files import find, whole_path
+from cmg_mj.inputs.files import find, read_toml, whole_path
 from cmg_mj.inputs.messages import complaints
 from cmg_mj.inputs.overrides import assign, override
 from cmg_mj.laws import LAW_CLASSES
@@ -447,8 +447,8 @@ def read_study(name: str) -> StudyFile:
     """
     path = find("scenarios", name, ".toml", "scenario")
     try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
+        fields = read_toml(path, name)
+    except InputError:
         fields = {}  # as a scenario it is refused with what is wrong
     if "vary" not in fields and "sweep" not in fields:
         fields = {"scenario": name}

@@ -239,3 +239,21 @@ def test_a_processor_takes_one_axis() -> None:
     processor: Any = "a board"
     with pytest.raises(InputError, match=r"\(roll, pitch\), and one controller takes one; lock the others"):
         run_on(prepare(load_scenario("two_axes")), processor)
+
+
+@pytest.mark.parametrize("wrong", [{"x_e": math.nan}, {"x_e": math.inf}, {"u": math.nan}])
+def test_an_answer_that_is_no_number_stops_the_run(wrong: dict[str, float]) -> None:
+    """Of a law with an integrator."""
+    experiment = short("linear")
+    host = Recorder(experiment)
+    update = host.update
+
+    def forget(accelerations: Sequence[float], encoders: Sequence[float]) -> Decision:
+        decision = update(accelerations, encoders)
+        return decision._replace(**wrong) if len(host.decisions) == 20 else decision
+
+    host.update = forget  # type: ignore[method-assign]
+    (outcome,) = run_on(experiment, host).outcomes
+    assert outcome.kind == "stopped"
+    assert "the processor answered u = " in outcome.reason
+    assert "at t = 0.095 s" in outcome.reason

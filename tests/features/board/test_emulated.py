@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 from pathlib import Path
 
 import pytest
@@ -120,3 +121,12 @@ def test_c_that_is_refused(tmp_path: Path) -> None:
 def test_arithmetic_in_double_precision_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="double-promotion"):
         toy(tmp_path, update="if (e[0] * 0.1 > e[1]) return TOY_OK;")
+
+
+def test_what_is_sent_before_the_question_is_no_answer(tmp_path: Path) -> None:
+    """A board that answers twice is asked three times."""
+    with Board(toy(tmp_path)) as board:
+        for _ in range(3):
+            board._line.sendall(b"n" + board._packed(0.0, 0.0, 0.0))
+            select.select([board._line], [], [], 5.0)
+            assert board.step(1.0, 2.0, 3.0, 4.0)[0] == (1.0, 2.0, 3.0, 4.0)

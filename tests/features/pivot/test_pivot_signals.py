@@ -127,6 +127,8 @@ def test_going_back_in_time_gives_the_same_noise() -> None:
         ("t,a\n0,1\n", None, "too few samples (1); a track has at least two"),
         ("t,a\n0,1\n\n1,x\n", None, "column 'a': must hold numbers alone"),
         ("t,a\n0,1\n1,nan\n", None, "sample 2: nan m/s2 at 1 s: must be finite"),
+        ("t,a\n0,1\n1e308,2\n", None, "sample 2: 2 m/s2 at 1e+308 s: must be finite"),
+        ("t,a\n-1.7e308,1\n1.7e308,2\n", None, "sample 1: 1 m/s2 at -1.7e+308 s: must be finite"),
         ("t,a\n0,1\n1\n", None, "Expected 2 columns, got 1"),
         ("t,a\n0,1\n1,2,5\n", None, "Expected 2 columns, got 3"),
         ("t,a\n0,true\n1,false\n", None, "column 'a': must hold numbers alone"),

@@ -138,10 +138,10 @@ def test_noise_that_has_begun() -> None:
 
 
 WRONG_CONFIGS = {
-    "seed": ("-1", "1.5", "1 2", "9007199254740994"),
+    "seed": (" ", "-1", "1.5", "1 2", "9007199254740994"),
     "world": ("x", "0x10", "nan", "+1"),
-    "noise_density_ug_rthz": ("-400", "4e2x", "inf"),
-    "counts_per_g": ("-1", "none", "1e300"),
+    "noise_density_ug_rthz": ("   ", "-400", "4e2x", "inf"),
+    "counts_per_g": (" ", "-1", "none", "1e300"),
     "counts_per_revolution": ("-4096", "12 bit"),
     "start": ("rest",),
     "build": ("0123456789abcdef",),

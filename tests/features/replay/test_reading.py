@@ -16,7 +16,19 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
 from cmg_mj.features.replay.reading import read_log
-from tests.features.replay.motion import COLUMNS, DT, OMEGA, N, rate, read, sine, tilt, two_accelerometers, write_csv
+from tests.features.replay.motion import (
+    AMPLITUDE,
+    COLUMNS,
+    DT,
+    OMEGA,
+    N,
+    rate,
+    read,
+    sine,
+    tilt,
+    two_accelerometers,
+    write_csv,
+)
 
 T = DT * np.arange(N)
 ONE = {"time": "t_s", "tilt": "tilt_rad"}
@@ -326,3 +338,139 @@ def test_accelerometers_in_a_wrong_unit(swing: float, tmp_path: Path) -> None:
     wrong = two_accelerometers(tmp_path, swing, outer_x="g", outer_z="g").notes[-1]
     assert ": --scale outer_x=0.10" in wrong, wrong
     assert "--scale inner_x=0.00059" in two_accelerometers(tmp_path, swing, 16384.0 / STANDARD_GRAVITY).notes[0]
+
+
+SIGNS = [
+    (["# {}"], ""),
+    (["%{}", "% units: s, rad"], ""),
+    (["# Run 5, by me", "", "// {}"], ""),
+    (["# Run 5, with care", "{}"], ""),
+    (["#,{}"], "1,"),
+]
+
+
+@pytest.mark.parametrize(("beginning", "before"), SIGNS)
+def test_a_heading_behind_a_comment_sign(beginning: list[str], before: str, tmp_path: Path) -> None:
+    heading, *rows = write_csv(tmp_path / "log.csv", sine()).read_text().splitlines()
+    lines = [line.format(heading) for line in beginning] + [before + row for row in rows]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert_plain(read_log(tmp_path / "log.csv", ReadOptions(COLUMNS)))
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    ["{}Z", "{}+0000", "{}000000000 +02:00", "{}-05", "{} UTC"],
+)
+def test_dates_with_a_zone(stamp: str, tmp_path: Path) -> None:
+    """Zones change, and the fraction is left out where it is zero."""
+    stamps = [f"2026-11-22 06:{int(s // 60):02}:{s % 60:06.3f}" for s in T]
+    marked = [stamp.format(text) for text in stamps]
+    assert_plain(read(tmp_path, {**sine(), "t_s": marked}))
+    later = [f"2026-11-22T11:{int(s // 60):02}:{s % 60:06.3f}".removesuffix(".000") + "+05:00" for s in T]
+    marked[2000:] = later[2000:]
+    if stamp == "{}Z":
+        assert_plain(read(tmp_path, {**sine(), "t_s": marked}))
+    with pytest.raises(InputError, match="some stamps have a zone and some have none"):
+        read(tmp_path, {**sine(), "t_s": stamps[:1000] + marked[1000:]})
+
+
+PACKET_STAMPS = {
+    "two": lambda i: i // 2 * 0.01 + i % 2 * 0.0002,
+    "three": lambda i: i // 3 * 0.015 + i % 3 * 0.001,
+    "five with jitter": lambda i: i // 5 * 0.025 + i % 5 * 0.0002 + np.sin(i // 5) * 0.004,
+    "hundred": lambda i: i // 100 * 0.5 + i % 100 * 1e-4,
+    "stamped once": lambda i: i // 4 * 0.02,
+    "a pause": lambda i: i // 3 * 0.015 + i % 3 * 2e-4 + (i > 1500) * 9.0,
+}
+
+
+@pytest.mark.parametrize("kind", PACKET_STAMPS)
+@pytest.mark.parametrize("rows", [slice(None), slice(1, -1), slice(2, -1)])
+def test_packets_are_refused_with_the_cure(kind: str, rows: slice, tmp_path: Path) -> None:
+    columns = {**sine(), "t_s": PACKET_STAMPS[kind](np.arange(N))}
+    for options in ({}, {"max_gap_s": 0.5}):
+        with pytest.raises(InputError, match=r"leave time out and give --rate (\d+\.?\d*)$") as info:
+            read(tmp_path, {name: values[rows] for name, values in columns.items()}, **options)
+        assert float(str(info.value).split()[-1]) == pytest.approx(200.0, rel=0.005)
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(1, -1), slice(1, None)])
+@pytest.mark.parametrize("steps", [(4, 16), (7, 13), (7, 7, 16)])
+def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: slice, tmp_path: Path) -> None:
+    t = 1e-3 * np.concatenate([[0.0], np.cumsum(np.resize(steps, 3000))])[rows]
+    log = read(tmp_path, sine(t))
+    assert log.dt == pytest.approx(0.01, rel=1e-3)
+    assert f"uneven steps, {steps[0]} to {steps[-1]} ms, are resampled to" in log.notes[0]
+    assert_sine(log, 2e-3)  # straight lines over 16 ms: 0.2 (2 pi 0.016)^2 / 8
+    assert np.isfinite(log["reference_rad_s"]).mean() > 0.99
+
+
+@pytest.mark.parametrize("lost", [0.02, 0.1, 0.18])
+def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) -> None:
+    kept = np.random.default_rng(2).uniform(size=N) > lost
+    log = read(tmp_path, {name: values[kept] for name, values in sine().items()})
+    assert log.dt == pytest.approx(DT, rel=1e-6)
+    assert_sine(log, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("place", "ending"),
+    [("gyro_rad_s", "largest value, 1"), ("gyro_rad_s", "smallest value, -1"), ("tilt_rad", "largest value, 0.15")],
+)
+def test_what_is_clipped_is_named_and_not_compared(place: str, ending: str, tmp_path: Path) -> None:
+    columns, limit = sine(), float(ending.split()[-1])
+    columns[place] = (np.minimum if limit > 0.0 else np.maximum)(columns[place], limit)
+    log = read(tmp_path, columns)
+    clipped = columns[place] == limit
+    assert log.notes == (
+        f"{clipped.sum():,} rows of '{place}' stand at the same {ending}: its sensor is clipped there, and the "
+        "reference is not compared",
+    )
+    np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), clipped)
+
+
+@pytest.mark.parametrize("step", [0.001, 0.02, 0.1])
+@pytest.mark.parametrize("noise", [0.0, 0.3, 1.5])
+def test_a_quantiser_is_not_clipped(step: float, noise: float, tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    for size, name in ((1.0, "tilt_rad"), (5.0, "gyro_rad_s")):
+        columns, q = sine(), step * size
+        columns[name] = q * np.round(columns[name] / q + noise * random.standard_normal(N))
+        assert not any("clipped" in note for note in read(tmp_path, columns).notes)
+
+
+def test_a_tilt_at_rest_is_not_clipped(tmp_path: Path) -> None:
+    """It comes to its stop at full speed, and lies there."""
+    swing, still = 0.3 * np.sin(T), np.abs(0.3 * np.sin(T)) > 0.2
+    rate = np.where(still, 0.0, 0.3 * np.cos(T)) + 1e-3 * np.random.default_rng(4).standard_normal(N)
+    log = read(tmp_path, {"t_s": T, "tilt_rad": np.round(np.clip(swing, -0.2, 0.2), 4), "gyro_rad_s": rate})
+    assert log.notes == ()
+
+
+@pytest.mark.parametrize("at", [0, 1000, N])
+def test_nul_bytes_are_named(at: int, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", sine())
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[: at + 1]) + bytes(40) + b"".join(lines[at + 1 :]))
+    with pytest.raises(InputError, match=f"byte {len(b''.join(lines[: at + 1])):,} is NUL"):
+        read_log(path, ReadOptions(COLUMNS))
+
+
+def test_a_quote_that_swallows_rows_is_named(tmp_path: Path) -> None:
+    note = ["ok"] * N
+    note[100], note[295] = '"oops', 'x"'
+    for name in ("note", "t_s2"):
+        with pytest.raises(InputError, match=f"a quote in column '{name}', about line 102, ends 195 lines later"):
+            read(tmp_path, {**sine(), name: note})
+
+
+@pytest.mark.parametrize(("place", "size"), [("tilt_rad", 1e308), ("gyro_rad_s", 1e200), ("t_s", 3e307)])
+def test_a_number_beyond_all_sizes_is_none(place: str, size: float, tmp_path: Path) -> None:
+    """Squares of these overflow."""
+    columns = sine()
+    columns[place][1000] = size
+    log = read(tmp_path, columns)
+    assert np.isfinite(log["y1_rad"]).all()
+    np.testing.assert_allclose(np.nanmax(np.abs(log["reference_rad_s"])), AMPLITUDE * OMEGA, rtol=1e-3)
+    with pytest.raises(InputError, match=r"all that is needed|no number"):
+        read(tmp_path, {**columns, place: size * np.linspace(0.5, 1.0, N)})

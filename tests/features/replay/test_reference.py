@@ -111,6 +111,16 @@ def test_a_delay_below_its_error_is_none(tmp_path: Path) -> None:
     assert "--delay" not in last_remark(log)
 
 
+def test_what_cannot_be_compared_says_why(tmp_path: Path) -> None:
+    """Too short, with gaps, or without motion."""
+    for rows in (np.arange(N) < 40, np.arange(N) % 30 > 4):
+        rate = np.where(rows, RATE, np.nan)
+        assert "nowhere are both known for 0.4 s on end" in remark(tmp_path, rate=rate)
+    log = read(tmp_path, sine())
+    still = replace(log, columns={**log.columns, "y1_rad": np.zeros(N)})
+    assert "too little motion" in last_remark(still)
+
+
 def test_the_other_way_round(tmp_path: Path) -> None:
     assert remark(tmp_path, rate=-RATE).startswith("The reference counts the other way")
     assert real_remark(scale={"rate": -1.0}).endswith(": --scale rate=1.")

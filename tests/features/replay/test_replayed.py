@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from cmg_mj import InputError, ReducedModel, load_scenario, prepare
@@ -21,10 +23,11 @@ from cmg_mj.features.replay.noise import noise_numbers, noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Measurement, make_observer
 from cmg_mj.observers.parameter_options import parameters_of
+from cmg_mj.results.folder import METADATA_KEY
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.save import report_run, save_run
 from tests.command import cmg_mj
-from tests.features.replay.motion import COLUMNS, DT, N, read, sine
+from tests.features.replay.motion import AMPLITUDE, COLUMNS, DT, N, rate, read, sine, two_accelerometers
 from tests.observers.reference import PAPER
 
 KEYS = ("velocity_rms_error_rad_s", "velocity_fit", "velocity_rms_error_push_rad_s", "velocity_fit_push")
@@ -226,3 +229,39 @@ def test_a_replay_has_its_columns_and_a_frame(tmp_path: Path) -> None:
     result = replay_log(log(tmp_path), ["linear"])
     assert list(dict(result)) == result.keys()
     np.testing.assert_array_equal(result.to_pandas()["estimate/linear/x2_rad_s"], result["estimate/linear/x2_rad_s"])
+
+
+FOREIGN = {
+    "text": lambda t: t.set_column(t.column_names.index("y1_rad"), "y1_rad", pa.array(["x"] * len(t))),
+    "nested": lambda t: t.set_column(t.column_names.index("u_rad_s"), "u_rad_s", pa.array([{"u": 1.0}] * len(t))),
+    "without the tilt": lambda t: t.drop_columns("y1_rad"),
+    "without the rate": lambda t: t.drop_columns("x2_rad_s"),
+    "constant time": lambda t: t.set_column(0, "time_s", pa.array(np.zeros(len(t)))),
+    "infinite time": lambda t: t.set_column(0, "time_s", pa.array(np.full(len(t), np.inf))),
+    "backwards": lambda t: t.set_column(0, "time_s", pa.array(t["time_s"].to_numpy()[::-1].copy())),
+    "deep": lambda t: t.replace_schema_metadata({METADATA_KEY: b"[" * 100_000}),
+    "another scenario": lambda t: t.replace_schema_metadata(
+        {METADATA_KEY: json.dumps({**json.loads(t.schema.metadata[METADATA_KEY]), "scenario": {"push": 7}})}
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_a_foreign_recording_is_refused_in_a_line(kind: str, run: Path, tmp_path: Path) -> None:
+    table = pq.read_table(run / "trajectory.parquet")
+    assert table.column_names[0] == "time_s"
+    pq.write_table(FOREIGN[kind](table), tmp_path / "foreign.parquet")
+    words = "time_s: its rows are not" if kind in ("constant time", "infinite time", "backwards") else "--columns"
+    assert words in cmg_mj("replay", tmp_path / "foreign.parquet").complaint
+
+
+@pytest.mark.parametrize("swing", [1.0, 8.0, 20.0])
+def test_an_observer_may_start_in_the_middle_of_a_motion(swing: float, tmp_path: Path) -> None:
+    """On a pivot at rest `free_pivot` does as `gyro_free`, however fast the log begins."""
+    log = two_accelerometers(tmp_path, np.radians(swing), noise=0.04)
+    true = np.radians(swing) / AMPLITUDE * rate(log["time_s"])
+    replayed = replay_log(log, ["gyro_free", "free_pivot"])
+    ends = [estimates["x2_rad_s"][200:] - true[200:] for estimates in replayed.estimates.values()]
+    gyro_free, free_pivot = (np.sqrt(np.mean(error**2)) for error in ends)
+    assert gyro_free < 0.013
+    assert free_pivot == pytest.approx(gyro_free, rel=0.05)

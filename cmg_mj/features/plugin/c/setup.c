@@ -145,9 +145,10 @@ static int configured(const search *in, int instance, int key, double otherwise,
     if (!text || !*text) return 1;
     const double number = strtod(text, &end);
     const int is_too_long = is_integer && strtoull(text, NULL, 10) > (unsigned long long)most; /* rounded, it is not */
+    const int is_empty = end == text;
     const int is_decimal = !text[strspn(text, is_integer ? "0123456789" : "0123456789.eE+- ")];
     while (*end == ' ') ++end;
-    if (!is_decimal || is_too_long || *end || end == text || !(number >= 0.0 && number <= most) || (is_integer && number != floor(number)))
+    if (!is_decimal || is_too_long || *end || is_empty || !(number >= 0.0 && number <= most) || (is_integer && number != floor(number)))
         return refuse(in, "<config key=\"%s\" value=\"%.40s\">: must be %s from 0 to %.16g", setup_keys[key], text,
             is_integer ? "a whole number" : "a number", most);
     *value = number;
