@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.mounting.hold import ALWAYS_ON, is_off
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.elements import SENSORS, TILT_ELEMENT
 from cmg_mj.plant.mjcf import parse
@@ -73,6 +74,9 @@ def attach_modules(
     for name in names:
         mounts.append(body.add_frame(name=f"{name}_mount"))
         mounts[-1].attach_body(scaled_module(scale).body("half"), f"{name}/", "")
+    for actuator in spec.actuators:
+        if actuator.name.startswith(tuple(f"{name}/" for name in names)) and is_off(spec, actuator):
+            actuator.group = ALWAYS_ON
     return mounts
 
 

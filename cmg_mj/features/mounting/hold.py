@@ -13,6 +13,8 @@ from cmg_mj.features.mounting.request import MountRequest
 from cmg_mj.plant.elements import ON_A_JOINT
 from cmg_mj.plant.mjcf import posed
 
+ALWAYS_ON = 31
+"""A group of actuators that no `actuatorgroupdisable` can name."""
 _FILTERS = mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
 
 
@@ -45,6 +47,11 @@ def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarra
         if dynamics in (mujoco.mjtDyn.mjDYN_INTEGRATOR, *_FILTERS):
             act[state] = target
     return act, ctrl
+
+
+def is_off(spec: mujoco.MjSpec, actuator: mujoco.MjsActuator) -> bool:
+    """Return whether a model switches off the group of an actuator."""
+    return 0 <= actuator.group < ALWAYS_ON and bool(spec.option.disableactuator >> actuator.group & 1)
 
 
 def _pulls_back(kind: int, bias: np.ndarray) -> bool:
@@ -108,6 +115,7 @@ def hold_joints(
         if name not in poses:
             raise InputError(f"--release {name}: no such joint; {nearest(name, poses, 'its joints')}")
     servos = [a for a in spec.actuators if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
+    servos = [servo for servo in servos if not is_off(spec, servo)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
     free = {*moving, *request.release}
@@ -179,7 +187,12 @@ def as_qpos(model: mujoco.MjModel, poses: Mapping[str, np.ndarray]) -> np.ndarra
 
 
 def write_keyframe(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, qpos: np.ndarray, speeds: Mapping[str, float]
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    name: str,
+    qpos: np.ndarray,
+    speeds: Mapping[str, float],
+    own: mujoco.MjData | None = None,
 ) -> None:
     """Write a keyframe in which the robot stands and its flywheels turn; other position servos hold their joints.
 
@@ -189,8 +202,16 @@ def write_keyframe(
         name: Name of the keyframe.
         qpos: Joint positions, (nq,).
         speeds: Flywheel joint -> speed, which its motor holds [rad/s].
+        own: The robot without the pair at a keyframe of its file, of which all but the pair's is kept.
     """
-    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
+    data = posed(model, qpos)
+    data.act[:], data.ctrl[:] = rest_controls(model, data)
+    if own is not None:
+        for i in range(own.model.njnt):
+            data.joint(own.model.joint(i).name).qvel = own.joint(i).qvel
+        data.act[: own.act.size], data.ctrl[: own.ctrl.size] = own.act, own.ctrl  # attached actuators come last
+        data.time, data.mocap_pos, data.mocap_quat = own.time, own.mocap_pos, own.mocap_quat
     for joint, speed in speeds.items():
-        qvel[model.joint(joint).dofadr[0]] = controls[model.actuator(f"{joint}_motor").id] = speed
-    spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
+        data.joint(joint).qvel = data.actuator(f"{joint}_motor").ctrl = speed
+    mocap = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
+    spec.add_key(name=name, time=data.time, qpos=qpos, qvel=data.qvel, act=data.act, ctrl=data.ctrl, **mocap)

@@ -29,7 +29,7 @@ from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.build import build
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axis_modules
-from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
+from cmg_mj.plant.mjcf import as_mjcf, compile_model, data_at_keyframe, parse, posed, quiet, set_control_callback
 from cmg_mj.results.folder import is_own, is_signed, signed, whole_file
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -225,7 +225,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     place = find_place(model, pose, request)
     if place.joint in existing.lines:
         raise InputError(f"the hinge {place.joint!r} has an axis already: another one needs another hinge")
-    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    keyframes = [(model.key(i).name, data_at_keyframe(model, i)) for i in range(model.nkey)]
     for key in list(spec.keys):  # the robot gets more joints
         spec.delete(key)
     held = hold_joints(spec, model, pose, request, {place.joint, *existing.lines, *existing.drives})
@@ -253,7 +253,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds)
     for name, own in keyframes:
         if name != EQUILIBRIUM_KEY:  # of an axis mounted earlier
-            write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
+            write_keyframe(spec, model, name, as_qpos(model, poses_of(own.model, own.qpos) | gimbals), speeds, own)
     model = compile_model(spec, path)
     key = model.key(EQUILIBRIUM_KEY).id
     check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]).line)

@@ -120,10 +120,10 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, he
     geoms = tree[model.geom_bodyid]
     level, reach = data.geom_xpos[geoms, 2], model.geom_rbound[geoms]
     step = SEARCH_SHARE * np.ptp([level - reach, level + reach])
-    at = data.qpos[height]
+    last = at = data.qpos[height]
     lifted = touches(at)
     for _ in range(MAX_SEARCH_STEPS):
-        at += step if lifted else -step
+        last, at = at, at + (step if lifted else -step)
         if touches(at) != lifted:
             break
     else:
@@ -131,7 +131,7 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, he
             "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
             'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
         )
-    free, touching = (at, at - step) if lifted else (at + step, at)
+    free, touching = max(last, at), min(last, at)
     while free - touching > SEARCH_ERROR * step:
         middle = 0.5 * (free + touching)
         free, touching = (free, middle) if touches(middle) else (middle, touching)
@@ -346,9 +346,13 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     address = model.jnt_qposadr[joint]
     upright = qpos[address] - sign * lean
     low, high = model.jnt_range[joint]
-    if model.jnt_limited[joint] and not low <= upright <= high:
+    room = min(upright - low, high - upright) - model.jnt_margin[joint]
+    if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
+        place = "beyond" if room + model.jnt_margin[joint] < -math.radians(TRUE_DEG) else "at the end of"
         raise InputError(
-            f"the hinge {name!r} would stand upright at {upright:.4g} rad, beyond its range of {low:.4g} to {high:.4g}"
+            f"the hinge {name!r} would stand upright at {upright:.4g} rad, {place} its range of {low:.4g} to "
+            f"{high:.4g}: it must be free to lean by {STANDS_DEG:g} deg either way; widen the range, or turn its zero "
+            "(joint ref, or the body's pose)"
         )
     qpos = qpos.copy()
     qpos[address] = upright
