@@ -17,7 +17,7 @@ from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
 from cmg_mj.plant.elements import subtree
 from cmg_mj.plant.mjcf import compile_model, posed
-from cmg_mj.plant.tilt_line import UP, Line, turn_pose
+from cmg_mj.plant.tilt_line import UP, Line, SupportLine, turn_pose
 
 MAX_SETTLE_S = 10.0
 """Longest time for a robot to come to rest [s]."""
@@ -71,6 +71,7 @@ def stand(
     Raises:
         InputError: The robot has nothing to stand on, falls over, or stands by itself.
     """
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # physics that fails must say so
     data = posed(model, pose)
     data.act[:], data.ctrl[:] = rest_controls(model, data)  # servos keep the joints where they are
     tree = model.body_rootid == model.body_rootid[model.jnt_bodyid[joint]]
@@ -367,6 +368,8 @@ MAX_FALL_S = 3.0
 """Longest simulation; a robot whose tilt has not grown so much by then falls too slowly to judge, or stands [s]."""
 SLOWEST = math.acosh(UNTIL) / MAX_FALL_S
 """Slowest fall of a robot that a pair is mounted on [1/s]."""
+FALL_TIME_CONSTANTS = 10.0
+"""Time constants within which `TRIED_DEG` becomes `LEFT_DEG`; 6 on a rigid robot."""
 
 
 def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
@@ -381,6 +384,16 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
     Returns:
         lambda [1/s]; 0 if the tilt does not grow, and less than `SLOWEST` if it has not grown enough in time.
     """
+    start = math.radians(TRIED_DEG)
+    data, growth = _let_go(model, key, line, start - bias), 1.0
+    while growth < UNTIL and data.time < MAX_FALL_S:
+        mujoco.mj_step(model, data)
+        growth = (line.lean(data.qpos) + bias) / start
+    return math.acosh(growth) / data.time if growth > 1.0 else 0.0
+
+
+def _let_go(model: mujoco.MjModel, key: int, line: Line, tilt: float) -> mujoco.MjData:
+    """Return data at a keyframe, tilted, its flywheels at rest."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
     spinning = data.qvel != 0.0
@@ -389,13 +402,8 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
         joint = model.actuator_trnid[motor, 0]
         if model.actuator_trntype[motor] == mujoco.mjtTrn.mjTRN_JOINT and spinning[model.jnt_dofadr[joint]]:
             data.ctrl[motor] = 0.0
-    start = math.radians(TRIED_DEG)
-    line.tilt(data, start - bias)
-    growth = 1.0
-    while growth < UNTIL and data.time < MAX_FALL_S:
-        mujoco.mj_step(model, data)
-        growth = (line.lean(data.qpos) + bias) / start
-    return math.acosh(growth) / data.time if growth > 1.0 else 0.0
+    line.tilt(data, tilt)
+    return data
 
 
 def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
@@ -411,3 +419,13 @@ def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
             f"that fall with {SLOWEST:.2g} 1/s or faster: it stands by itself, geoms that overlap hold it (let them "
             "not collide: <exclude>), or its mass is far up (--position is in metres)"
         )
+    for side in (TRIED_DEG, -TRIED_DEG) if isinstance(line, SupportLine) else ():
+        data = _let_go(model, key, line, math.radians(side))
+        while abs(line.lean(data.qpos)) < math.radians(LEFT_DEG):
+            mujoco.mj_step(model, data)
+            if data.time > FALL_TIME_CONSTANTS / pole:
+                raise InputError(
+                    f"the robot stands by itself: let go where its mass is above the line, it is still within "
+                    f"{LEFT_DEG:g} deg of there after {data.time:.2g} s, as on the edge of a flat foot; take away what "
+                    "it comes to rest on"
+                )
