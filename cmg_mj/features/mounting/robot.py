@@ -16,6 +16,7 @@ from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axis_modules, missing_elements
 from cmg_mj.plant.mjcf import compile_model, parse, posed
+from cmg_mj.plant.settings import NO_BATCH
 from cmg_mj.plant.tilt_line import HingeLine
 
 BAD_CONNECTIONS = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
@@ -26,7 +27,6 @@ NEEDED = ("constraint", "equality", "gravity", "actuation", "sensor")
 """Names in MJCF's <flag> of flags that must not be switched off."""
 MAX_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
-WAKE = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 ITERATIONS, TOLERANCE = 100, 1e-8
 """MuJoCo's defaults for the solver; with less, held joints creep."""
 
@@ -125,9 +125,9 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
         option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         notes.append("its solver is now Newton: another does not hold joints stiffly")
     option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
-    if option.enableflags & WAKE:
-        option.enableflags &= ~WAKE
-        notes.append("its flag sleep is now off: many worlds at once know none")
+    if option.enableflags & NO_BATCH:
+        option.enableflags &= ~NO_BATCH
+        notes.append("its flags sleep and ipc are now off: worlds that are stepped together have neither")
     if option.timestep > MAX_STEP_S:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
         option.timestep = MAX_STEP_S
