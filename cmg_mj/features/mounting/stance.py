@@ -32,7 +32,8 @@ MAX_LEAN_DEG = 20.0
 STANDS_DEG = 2.0
 """A robot that must lean so far before it falls stands by itself [deg]."""
 LEFT_DEG = 10.0
-"""A robot that comes to rest nearer to where it was left stands by itself; farther away, it leans on something [deg]."""
+"""A robot that comes to rest nearer to where it was let go stands by itself; farther away, it leans on something
+[deg]."""
 MIN_FRICTION = math.tan(math.radians(STANDS_DEG))
 """On contacts with less friction a robot slides before it leans by `STANDS_DEG`."""
 MIN_HEIGHT_M = 1e-3
@@ -52,9 +53,7 @@ class Support(NamedTuple):
     """Direction of the line, horizontal, in the world (3,)."""
 
 
-def stand(
-    model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray, *, alone: bool = True
-) -> Support:
+def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray, *, alone: bool = True) -> Support:
     """Let a free robot settle on the floor, its mass above a line through its contacts.
 
     Args:
@@ -171,8 +170,8 @@ def _rest(
     floor = min((contact.pos[2] for _, contact, _ in _contacts(model, data, tree)), default=-math.inf)
     height = max(data.subtree_com[body][2] - floor, MIN_HEIGHT_M)
     stiffness = held * 20.0 * mass * gravity * height
-    # Implicit in the step, and so stable for robots of any size: the torque at the step's end, by the inertia against it
-    # (the least, that without contacts).
+    # Implicit in the step, and so stable for robots of any size: the torque at the step's end, by the least inertia
+    # against it, that without contacts.
     damping = 2.0 * mass * height * math.sqrt((20.0 if held else 1.0) * gravity * height) + step * stiffness
     drag = mass * math.sqrt(gravity / height)
     start, off, twist, answer = data.xquat[body].copy(), np.empty(3), np.zeros((1, model.nv)), np.empty((1, model.nv))
@@ -190,7 +189,7 @@ def _rest(
             raise InputError("the robot's physics fails while it settles on the floor")
         turned = math.degrees(np.linalg.norm(off))
         resting = count * step > 0.3 and np.abs(data.qvel).max() < AT_REST
-        if resting or not held and turned > LEFT_DEG:
+        if resting or (turned > LEFT_DEG and not held):
             break
     data.qfrc_applied[:] = 0.0
     mujoco.mj_forward(model, data)
