@@ -346,6 +346,8 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     address = model.jnt_qposadr[joint]
     upright = qpos[address] - sign * lean
     low, high = model.jnt_range[joint]
+    if model.jnt_limited[joint]:  # whole turns away it is upright too
+        upright -= 2.0 * math.pi * round((upright - 0.5 * (low + high)) / (2.0 * math.pi))
     room = min(upright - low, high - upright) - model.jnt_margin[joint]
     if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
         place = "beyond" if room + model.jnt_margin[joint] < -math.radians(TRUE_DEG) else "at the end of"
