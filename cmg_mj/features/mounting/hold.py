@@ -13,8 +13,6 @@ from cmg_mj.features.mounting.request import MountRequest
 from cmg_mj.plant.elements import ON_A_JOINT
 from cmg_mj.plant.mjcf import posed
 
-ALWAYS_ON = 31
-"""A group of actuators that no `actuatorgroupdisable` can name."""
 _FILTERS = mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT
 
 
@@ -47,11 +45,6 @@ def rest_controls(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarra
         if dynamics in (mujoco.mjtDyn.mjDYN_INTEGRATOR, *_FILTERS):
             act[state] = target
     return act, ctrl
-
-
-def is_off(spec: mujoco.MjSpec, actuator: mujoco.MjsActuator) -> bool:
-    """Return whether a model switches off the group of an actuator."""
-    return 0 <= actuator.group < ALWAYS_ON and bool(spec.option.disableactuator >> actuator.group & 1)
 
 
 def _pulls_back(kind: int, bias: np.ndarray) -> bool:
@@ -114,8 +107,8 @@ def hold_joints(
     for name in request.release:
         if name not in poses:
             raise InputError(f"--release {name}: no such joint; {nearest(name, poses, 'its joints')}")
-    servos = [a for a in spec.actuators if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
-    servos = [servo for servo in servos if not is_off(spec, servo)]
+    working = [a for a in spec.actuators if not spec.option.disableactuator >> a.group & 1]
+    servos = [a for a in working if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
     free = {*moving, *request.release}

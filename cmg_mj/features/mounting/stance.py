@@ -350,11 +350,9 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
         upright -= 2.0 * math.pi * round((upright - 0.5 * (low + high)) / (2.0 * math.pi))
     room = min(upright - low, high - upright) - model.jnt_margin[joint]
     if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
-        place = "beyond" if room + model.jnt_margin[joint] < -math.radians(TRUE_DEG) else "at the end of"
         raise InputError(
-            f"the hinge {name!r} would stand upright at {upright:.4g} rad, {place} its range of {low:.4g} to "
-            f"{high:.4g}: it must be free to lean by {STANDS_DEG:g} deg either way; widen the range, or turn its zero "
-            "(joint ref, or the body's pose)"
+            f"the hinge {name!r} would stand upright at {upright:.4g} rad, at the end of its range of {low:.4g} to "
+            f"{high:.4g} or beyond its range: widen the range, so that it can lean by {STANDS_DEG:g} deg either way"
         )
     qpos = qpos.copy()
     qpos[address] = upright
