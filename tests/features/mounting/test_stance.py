@@ -111,6 +111,16 @@ def test_a_robot_of_any_size_stands_and_falls_at_any_step(size: float, step: flo
             assert expected * math.sqrt(size) == pytest.approx(2.686, rel=1e-3)
 
 
+@pytest.mark.parametrize("step", [0.0005, 0.005])
+@pytest.mark.parametrize("size", [0.05, 1.0])
+def test_a_mass_on_a_mast_settles(size: float, step: float) -> None:
+    """The inertia about its own centre is a five-thousandth of that about the line."""
+    text = robot("ball feet", size, step).replace('type="box" size="', f'size="{0.03 * size}" user="')
+    model = put(text, body="frame", scale=max(0.3 * size, 0.05), position=(0.0, 0.0, 0.5 * size))
+    expected = rolling_pole(model, LENGTHS["r"] * size)
+    assert simulated_rate(model, expected) == pytest.approx(expected, rel=0.02)
+
+
 HFIELD = '<asset><hfield name="h" nrow="9" ncol="9" size="2 2 0.1 0.1"/></asset>'
 UNTOUCHED = trunk(floor=FLOOR.replace("/>", ' contype="0" conaffinity="0"/>'), after="{}").replace(
     'mass="0.2"', 'mass="0.2" contype="0" conaffinity="0"'
