@@ -208,7 +208,7 @@ def mount(
 
 def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> MountedRobot:
     """Mount a pair on a model, which is changed."""
-    body = body_of(spec, request.body)
+    body, has_keyframes = body_of(spec, request.body), bool(spec.keys)
     if request.base == "free":
         free_base(spec, body, path)
     names = [f"{request.prefix}cube{i + 1}" for i in range(request.modules)]
@@ -233,6 +233,8 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     # With the modules on it.
     mounts = attach_modules(spec, body, names, request.scale)
     notes = set_physics_options(spec)
+    if has_keyframes and not keyframes:
+        notes.append("its keyframes are left out: they have the joints that a free base replaces")
     gimbals = {f"{module}/gimbal": np.array([math.pi / 2.0]) for module in names}
     others = [line for line in existing.lines if line != place.joint]
     poses = poses_of(model, pose) | gimbals
