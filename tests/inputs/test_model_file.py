@@ -271,7 +271,7 @@ HOSTILE = {
     ),
     "copies of copies": (
         FREE.format('<replicate count="1000"><replicate count="1000"><geom size="1"/></replicate></replicate>'),
-        "my.xml: <replicate>: makes 1e+06 copies; at most 100,000 are read",
+        "my.xml: <replicate>: makes 1e+06 copies; at most 20,000 are read",
     ),
     "a composite": ('<worldbody><flexcomp count="999 999 999"/></worldbody>', "<flexcomp>: makes 9.97e+08 copies"),
     "models in models": ('<include file="a.xml"/>', "my.xml: c.xml: <replicate>: makes 1e+06 copies"),
