@@ -1,6 +1,6 @@
-"""Robots of 5 cm to 3 m in plain MuJoCo: the table of docs/mount_evidence.md.
+"""Robots of 5 cm to 3 m in plain MuJoCo: what docs/mount_evidence.md says of them.
 
-python docs/studies/robots_of_any_size.py [SIZE ...] (twenty minutes)
+python docs/studies/robots_of_any_size.py [SIZE ...] (ten minutes on a quiet core)
 
 `cmg-mj mount --plugin` mounts each. MuJoCo alone then steps the model with its plugin, in ten worlds of another seed,
 and pushes the frame to both sides with the torque that `mount` printed, and with 1.8 times it.
