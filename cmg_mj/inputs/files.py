@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 from cmg_mj.core.errors import InputError, nearest
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-_INCLUDED = re.compile(r"""<(?:include|model)\b[^<>]*?\bfile\s*=\s*["']([^"']*)["']""")
+_COMMENT = re.compile(r"""<!--.*?-->|"[^"]*"|'[^']*'""", re.DOTALL)
+"""A comment, which a parser must not see: MuJoCo allows `--` in it; or a quoted text, where there is none."""
 MAX_MODEL_BYTES = 50_000_000
 MAX_TOML_BYTES = 10_000_000
 """A scenario or study is smaller; the longest scenario that a run writes has three thousand bytes."""
+MAX_COPIES = 20_000
+"""Most copies of an element that <replicate> and the like make; MuJoCo takes 20 s for five times as many."""
+FOLDERS = "meshdir", "texturedir", "assetdir"
 
 
 def folder(name: str) -> Path:
@@ -136,20 +142,59 @@ def read_text(path: Path, name: str, max_bytes: int) -> str:
         raise InputError(f"{name}: cannot be read: {error.strerror}") from error
 
 
-def model_files(path: Path, within: tuple[Path, ...] = ()) -> list[Path]:
+def model_files(path: Path) -> list[Path]:
     """List a model's file and those that it includes or attaches, as far as they are there.
 
     Raises:
-        InputError: A file includes itself, which crashes MuJoCo, or cannot be read.
+        InputError: What would crash MuJoCo or keep it busy for ever: a file that includes itself, no XML, too many
+            copies, an asset that is no ordinary file. Or a file cannot be read.
     """
-    if path.resolve() in (file.resolve() for file in within):
-        raise InputError(f"{within[0]}: contains itself: {' in '.join(file.name for file in (*within, path))}")
-    within, files = (*within, path), [path]
-    name = str(path) if len(within) == 1 else f"{within[0]}: {path.name}"
-    for included in _INCLUDED.findall(_COMMENT.sub("", read_text(path, name, MAX_MODEL_BYTES))):
-        places = (path.parent / included, within[0].parent / included)
-        files += next((model_files(place, within) for place in places if place.is_file()), [])
+    files: list[Path] = []
+    folders, names = {""}, set[str]()
+
+    def read(file: Path, within: tuple[Path, ...], copies: int) -> None:
+        if file.resolve() in (outer.resolve() for outer in within):
+            raise InputError(f"{path}: contains itself: {' in '.join(each.name for each in (*within, file))}")
+        name = f"{path}: {file.name}" if within else str(path)
+        text = _COMMENT.sub(_without_comment, read_text(file, name, MAX_MODEL_BYTES)).lstrip()
+        within, stack, inner, attached = (*within, file), [copies], list[tuple[str, int]](), 0
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal attached
+            counts = [int(count) for count in attributes.get("count", "").split() if count.isdecimal()]
+            stack.append(stack[-1] * max(1, math.prod(counts)))
+            attached += stack[-1] * (tag == "attach")
+            if stack[-1] > MAX_COPIES or attached > MAX_COPIES:
+                raise InputError(f"{name}: <{tag}>: makes {stack[-1]:.3g} copies; at most {MAX_COPIES:,} are read")
+            folders.update(attributes[key] for key in FOLDERS if key in attributes)
+            names.update(value for key, value in attributes.items() if key.startswith("file"))
+            if tag in ("include", "model") and "file" in attributes:
+                inner.append((attributes["file"], stack[-1] if tag == "include" else 0))
+
+        parser = expat.ParserCreate()
+        parser.StartElementHandler, parser.EndElementHandler = start, lambda _: stack.pop()
+        try:
+            parser.Parse(text, True)
+        except expat.ExpatError as error:
+            why = f"XML syntax error at line {error.lineno}: {expat.ErrorString(error.code)}"
+            raise InputError(f"{name}: not a model MuJoCo can read: {why}") from error
+        files.append(file)
+        for included, times in inner:
+            places = (file.parent / included, path.parent / included)
+            for place in [place for place in places if place.is_file()][:1]:
+                read(place, within, times or max(copies, attached))
+
+    read(path, (), 1)
+    for base, below, asset in itertools.product({file.parent for file in files}, folders, names):
+        for place in (base / below / asset.removeprefix("package://"), base / below / Path(asset).name):
+            if place.exists() and not (place.is_file() or place.is_dir()):
+                raise InputError(f"{path}: {asset}: is no ordinary file")
     return files
+
+
+def _without_comment(part: re.Match[str]) -> str:
+    """Replace a comment by its line breaks, and keep a quoted text."""
+    return "\n" * part[0].count("\n") if part[0].startswith("<!--") else part[0]
 
 
 def whole_path(file: str, beside: Path) -> str:

@@ -23,10 +23,7 @@ _REFUSALS = ValueError, RuntimeError, MemoryError, mujoco.FatalError
 def _one_line(error: Exception) -> str:
     """MuJoCo's message without what tells a user nothing."""
     text = " ".join(str(error).split()).removeprefix("Error: ")
-    syntax = re.match(r"XML parse error .*Line number=(\d+)", text)
-    return (
-        f"XML syntax error at line {syntax[1]}" if syntax else re.sub(r" The (static|visual) .* remain so\.", "", text)
-    )
+    return re.sub(r" The (static|visual) .* remain so\.", "", text)
 
 
 def parse(path: Path) -> mujoco.MjSpec:

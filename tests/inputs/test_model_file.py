@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -243,3 +244,59 @@ def test_settings_that_no_physics_stands(wrong_input: str, fragments: list[str],
     outcome = cmg_mj("run", "push_recovery", "--set", f"plant.{wrong_input}", *step)
     assert_in_order(fragments, outcome.complaint)
     assert not Path("runs").exists()
+
+
+FREE = '<worldbody><body name="t"><freejoint/>{}</body></worldbody>'
+MESH = '<asset><mesh name="m" file="{}"/></asset>' + FREE.format('<geom type="mesh" mesh="m"/>')
+HOSTILE = {
+    "a name with >": ('<asset><model name="a>b" file="my.xml"/></asset>', "my.xml: contains itself: my.xml in my.xml"),
+    "a name that looks like a comment": (
+        '<asset><model name="<!--" file="my.xml"/><model name="-->" file="none"/></asset>',
+        "my.xml: not a model MuJoCo can read: XML syntax error at line 1",
+    ),
+    "an entity": ('<asset><model file="&#109;y.xml"/></asset>', "my.xml: contains itself: my.xml in my.xml"),
+    "a pipe": (MESH.format("pipe.stl"), "my.xml: pipe.stl: is no ordinary file"),
+    "a pipe without its path": (
+        '<compiler strippath="true"/>' + MESH.format("no/pipe.stl"),
+        "no/pipe.stl: is no ordinary",
+    ),
+    "a pipe in the folder of an included file": (
+        '<include file="inner.xml"/>' + MESH.format("other.stl"),
+        "is no ordinary",
+    ),
+    "a pipe that is included": ('<include file="pipe.stl"/>', "pipe.stl: is no ordinary file"),
+    "a texture without end": (
+        '<asset><texture type="cube" fileright="zero.png"/></asset>',
+        "zero.png: is no ordinary file",
+    ),
+    "copies of copies": (
+        FREE.format('<replicate count="1000"><replicate count="1000"><geom size="1"/></replicate></replicate>'),
+        "my.xml: <replicate>: makes 1e+06 copies; at most 20,000 are read",
+    ),
+    "a composite": ('<worldbody><flexcomp count="999 999 999"/></worldbody>', "<flexcomp>: makes 9.97e+08 copies"),
+    "models in models": ('<include file="a.xml"/>', "my.xml: c.xml: <replicate>: makes 1e+06 copies"),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_a_model_that_would_crash_mujoco_or_never_end(case: str) -> None:
+    text, message = HOSTILE[case]
+    Path("sub").mkdir()
+    for pipe in ("pipe.stl", "sub/other.stl"):
+        os.mkfifo(pipe)
+    Path("zero.png").symlink_to("/dev/zero")
+    Path("inner.xml").write_text('<mujoco><compiler meshdir="sub"/></mujoco>')
+    for name, inner in (("a", "b"), ("b", "c"), ("c", "d")):
+        copies = f'<replicate count="100"><attach model="{inner}"/></replicate>'
+        asset = f'<asset><model name="{inner}" file="{inner}.xml"/></asset>'
+        Path(f"{name}.xml").write_text(f"<mujoco>{asset}<worldbody>{copies}</worldbody></mujoco>")
+    Path("my.xml").write_text(f"<mujoco>{text}</mujoco>")
+    assert message in cmg_mj("check", "my.xml").complaint
+
+
+def test_what_mujoco_reads_is_read() -> None:
+    """A comment with -- in it, which XML forbids; many copies; a name with > or an apostrophe; a declaration."""
+    copies = '<replicate count="500"><geom size="1"/></replicate>'
+    body = f'<worldbody><body name="it\'s a>b"/>{copies}</worldbody>'
+    Path("my.xml").write_text(f"\n<?xml version='1.0'?><!-- a -- 'b --><mujoco>{body}<!-- \" --></mujoco>")
+    assert "the model has no" in cmg_mj("check", "my.xml").complaint

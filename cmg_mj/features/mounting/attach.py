@@ -17,6 +17,8 @@ EDGE_M = 0.19
 """Edge of the module in `models/cube.xml` [m]."""
 INNER, OUTER = 0.25, 0.75
 """Places of the accelerometers, in shares of the robot's height above the line, as on the papers' rig."""
+ALWAYS_ON = 31
+"""A group of actuators that no `actuatorgroupdisable` can name."""
 SAME_WAY = 1e-9
 """Two orientations are the same if the cosine of half the angle between them is this near 1 (0.005 deg)."""
 
@@ -72,7 +74,11 @@ def attach_modules(
     mounts = []
     for name in names:
         mounts.append(body.add_frame(name=f"{name}_mount"))
-        mounts[-1].attach_body(scaled_module(scale).body("half"), f"{name}/", "")
+        module = scaled_module(scale)
+        if spec.option.disableactuator:
+            for actuator in module.actuators:
+                actuator.group = ALWAYS_ON
+        mounts[-1].attach_body(module.body("half"), f"{name}/", "")
     return mounts
 
 

@@ -107,7 +107,8 @@ def hold_joints(
     for name in request.release:
         if name not in poses:
             raise InputError(f"--release {name}: no such joint; {nearest(name, poses, 'its joints')}")
-    servos = [a for a in spec.actuators if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
+    working = [a for a in spec.actuators if not spec.option.disableactuator >> a.group & 1]
+    servos = [a for a in working if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
     ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
     free = {*moving, *request.release}
@@ -179,7 +180,12 @@ def as_qpos(model: mujoco.MjModel, poses: Mapping[str, np.ndarray]) -> np.ndarra
 
 
 def write_keyframe(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, name: str, qpos: np.ndarray, speeds: Mapping[str, float]
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    name: str,
+    qpos: np.ndarray,
+    speeds: Mapping[str, float],
+    own: mujoco.MjData | None = None,
 ) -> None:
     """Write a keyframe in which the robot stands and its flywheels turn; other position servos hold their joints.
 
@@ -189,8 +195,16 @@ def write_keyframe(
         name: Name of the keyframe.
         qpos: Joint positions, (nq,).
         speeds: Flywheel joint -> speed, which its motor holds [rad/s].
+        own: The robot without the pair at a keyframe of its file, of which all but the pair's is kept.
     """
-    qvel, (act, controls) = np.zeros(model.nv), rest_controls(model, posed(model, qpos))
+    data = posed(model, qpos)
+    data.act[:], data.ctrl[:] = rest_controls(model, data)
+    if own is not None:
+        for i in range(own.model.njnt):
+            data.joint(own.model.joint(i).name).qvel = own.joint(i).qvel
+        data.act[: own.act.size], data.ctrl[: own.ctrl.size] = own.act, own.ctrl  # attached actuators come last
+        data.time, data.mocap_pos, data.mocap_quat = own.time, own.mocap_pos, own.mocap_quat
     for joint, speed in speeds.items():
-        qvel[model.joint(joint).dofadr[0]] = controls[model.actuator(f"{joint}_motor").id] = speed
-    spec.add_key(name=name, qpos=qpos, qvel=qvel, act=act, ctrl=controls)
+        data.joint(joint).qvel = data.actuator(f"{joint}_motor").ctrl = speed
+    mocap = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
+    spec.add_key(name=name, time=data.time, qpos=qpos, qvel=data.qvel, act=data.act, ctrl=data.ctrl, **mocap)

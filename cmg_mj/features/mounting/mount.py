@@ -29,7 +29,7 @@ from cmg_mj.inputs.files import expanded, folder, model_files
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.build import build
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, axis_modules
-from cmg_mj.plant.mjcf import as_mjcf, compile_model, parse, posed, quiet, set_control_callback
+from cmg_mj.plant.mjcf import as_mjcf, compile_model, data_at_keyframe, parse, posed, quiet, set_control_callback
 from cmg_mj.results.folder import is_own, is_signed, signed, whole_file
 from cmg_mj.scenario.plant_settings import PlantSettings
 
@@ -208,7 +208,7 @@ def mount(
 
 def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> MountedRobot:
     """Mount a pair on a model, which is changed."""
-    body = body_of(spec, request.body)
+    body, has_keyframes = body_of(spec, request.body), bool(spec.keys)
     if request.base == "free":
         free_base(spec, body, path)
     names = [f"{request.prefix}cube{i + 1}" for i in range(request.modules)]
@@ -225,7 +225,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     place = find_place(model, pose, request)
     if place.joint in existing.lines:
         raise InputError(f"the hinge {place.joint!r} has an axis already: another one needs another hinge")
-    keyframes = [(model.key(i).name, poses_of(model, model.key_qpos[i])) for i in range(model.nkey)]
+    keyframes = [(model.key(i).name, data_at_keyframe(model, i)) for i in range(model.nkey)]
     for key in list(spec.keys):  # the robot gets more joints
         spec.delete(key)
     held = hold_joints(spec, model, pose, request, {place.joint, *existing.lines, *existing.drives})
@@ -233,6 +233,8 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     # With the modules on it.
     mounts = attach_modules(spec, body, names, request.scale)
     notes = set_physics_options(spec)
+    if has_keyframes and not keyframes:
+        notes.append("its keyframes are left out: they have the joints that a free base replaces")
     gimbals = {f"{module}/gimbal": np.array([math.pi / 2.0]) for module in names}
     others = [line for line in existing.lines if line != place.joint]
     poses = poses_of(model, pose) | gimbals
@@ -253,7 +255,7 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
     write_keyframe(spec, model, EQUILIBRIUM_KEY, qpos, speeds)
     for name, own in keyframes:
         if name != EQUILIBRIUM_KEY:  # of an axis mounted earlier
-            write_keyframe(spec, model, name, as_qpos(model, own | gimbals), speeds)
+            write_keyframe(spec, model, name, as_qpos(model, poses_of(own.model, own.qpos) | gimbals), speeds, own)
     model = compile_model(spec, path)
     key = model.key(EQUILIBRIUM_KEY).id
     check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]).line)

@@ -12,8 +12,8 @@ from cmg_mj.linear.ceiling import ceiling_words, plant_words
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, loop_words, measured_words, sliding_words
 from cmg_mj.plant.tilt_line import HingeLine
 
-BUSY = ": run it again while the machine does nothing else; till then the scenario's push is 0.6 E"
-"""Advice where the time did not suffice, in clauses."""
+SMALL_STEP_S = 5e-4
+"""With physics steps smaller than this the search takes longer than its time on any machine [s]."""
 
 
 def mount_report_lines(result: MountResult) -> Iterator[str]:
@@ -49,7 +49,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
         f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
         f"{result.push_limits.fraction_of_limit:.0%} of any controller's"
     )
-    yield f"  {result.observer}: {_simulated(result.simulated)}{reduced}"
+    yield f"  {result.observer}: {_simulated(result.simulated, _advice(result))}{reduced}"
     low = math.degrees(result.push_limits.limit.tilt) < LOW_LIMIT_DEG
     if low or (result.simulated and result.simulated.falls):
         reason = f"any controller recovers less than {LOW_LIMIT_DEG:g} deg" if low else "it does not stand"
@@ -71,19 +71,28 @@ def _pivot(result: MountResult) -> Iterator[str]:
         yield f"    in the reduced model: {IN_THE_MODEL}; not: {NOT_IN_THE_MODEL}"
 
 
-def _simulated(simulated: SimulatedPush | None) -> str:
+def _advice(result: MountResult) -> str:
+    """Say what to do where the time did not suffice."""
+    step = result.plant.timestep
+    cure = "run it again while the machine does nothing else"
+    if step < SMALL_STEP_S:
+        cure = f"its physics steps of {1e3 * step:.3g} ms are too many; give its file a larger <option timestep>"
+    return f": {cure}; till then the scenario's push is 0.6 E"
+
+
+def _simulated(simulated: SimulatedPush | None, advice: str) -> str:
     """Describe what the robot stands in MuJoCo, up to the words on the reduced model."""
     if simulated is None:
         return "not tried in MuJoCo; "
     if simulated.standing is None:
-        return f"in MuJoCo nothing found within {MAX_SEARCH_S:g} s{BUSY}; "
+        return f"in MuJoCo nothing found within {MAX_SEARCH_S:g} s{advice}; "
     if simulated.falls:
         fallen = simulated.worlds - simulated.standing
         return (
             f"does not stand: in MuJoCo {fallen} of {simulated.worlds} worlds fall within {UNPUSHED_S:g} s, unpushed; "
         )
     if not simulated.impulse:
-        reason = f"none found within {MAX_SEARCH_S:g} s{BUSY}"
+        reason = f"none found within {MAX_SEARCH_S:g} s{advice}"
         if simulated.complete:
             reason = f"not even {MIN_SHARE:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.plant.elements import subtree
 from cmg_mj.plant.mjcf import posed
 from cmg_mj.plant.tilt_line import UP
 
@@ -96,8 +97,10 @@ def find_place(model: mujoco.MjModel, pose: np.ndarray, request: MountRequest) -
         InputError: The body has no mass, there is no such hinge, or the axis is not horizontal.
     """
     axis, body, data = request.axis, model.body(request.body).id, posed(model, pose)
-    if not model.body_subtreemass[body] > 0.0:
-        raise InputError(f"--body {request.body}: has no mass, nor has anything on it")
+    if not model.body_mass[body] > 0.0:
+        heavy = [model.body(part).name for part in subtree(model, body) if model.body_mass[part] > 0.0]
+        names = ", ".join(heavy) or "none"
+        raise InputError(f"--body {request.body}: has no mass of its own; the bodies with mass on it: {names}")
     point = None if request.position is None else _three_numbers(request.position)
     middle = model.body_ipos[body].copy() if point is None else point
     chain, ancestor = [], body  # the joints between the body and the world, the nearest first

@@ -16,11 +16,13 @@ from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axis_modules, missing_elements
 from cmg_mj.plant.mjcf import compile_model, parse, posed
+from cmg_mj.plant.settings import NO_BATCH
 from cmg_mj.plant.tilt_line import HingeLine
 
 BAD_CONNECTIONS = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
 UNNAMED = "MuJoCo Model"
 """The name that MuJoCo gives to a model without one."""
+FLOORS = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD
 NEEDED = ("constraint", "equality", "gravity", "actuation", "sensor")
 """Names in MJCF's <flag> of flags that must not be switched off."""
 MAX_STEP_S = 0.005
@@ -63,7 +65,7 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
     _bake_masses(spec, model)
     _name_all(spec)
     for equality in spec.equalities:
-        kind = BAD_CONNECTIONS.get(equality.type)
+        kind = BAD_CONNECTIONS.get(equality.type) if equality.active else None
         if kind and not joint_held(spec, equality):
             raise InputError(
                 f"<{kind}> ties {equality.name1!r} and {equality.name2 or 'the world'!r} together: a closed "
@@ -123,6 +125,9 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
         option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         notes.append("its solver is now Newton: another does not hold joints stiffly")
     option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
+    if option.enableflags & NO_BATCH:
+        option.enableflags &= ~NO_BATCH
+        notes.append("its flags sleep and ipc are now off: worlds that are stepped together have neither")
     if option.timestep > MAX_STEP_S:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
         option.timestep = MAX_STEP_S
@@ -138,7 +143,22 @@ def body_of(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
     body = spec.body(name) if name != "world" else None
     if body is None:
         names = [body.name for body in spec.bodies if body.name != "world"]
-        raise InputError(f"--body {name}: no such body; {nearest(name, names, 'its bodies')}")
+        fused = any(geom.type not in FLOORS for geom in spec.worldbody.geoms)
+        cure = '; MuJoCo made the root of a URDF a part of the world: save it with <compiler fusestatic="false"/>'
+        raise InputError(f"--body {name}: no such body; {nearest(name, names, 'its bodies')}{cure if fused else ''}")
+    for part in (root_of(body), *root_of(body).find_all("body")):
+        if part.gravcomp:
+            raise InputError(
+                f"body {part.name!r} has gravcomp = {part.gravcomp:g}: what bears a robot's weight so takes the torque "
+                "away that it falls by, which the pair's reduced model has; take gravcomp out of the file"
+            )
+    return body
+
+
+def root_of(body: mujoco.MjsBody) -> mujoco.MjsBody:
+    """Return the child of the world that a body is part of."""
+    while body.parent.name != "world":
+        body = body.parent
     return body
 
 
@@ -153,9 +173,7 @@ def free_base(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path) -> None:
     Raises:
         InputError: Another element of the file refers to a joint that is removed.
     """
-    root = body
-    while root.parent.name != "world":
-        root = root.parent
+    root = root_of(body)
     joints = list(root.joints)
     if len(joints) == 1 and joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
         return

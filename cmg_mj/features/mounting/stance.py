@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,7 +17,7 @@ from cmg_mj.features.mounting.request import MountRequest, Place
 from cmg_mj.plant.checks import TRUE_DEG
 from cmg_mj.plant.elements import subtree
 from cmg_mj.plant.mjcf import compile_model, posed
-from cmg_mj.plant.tilt_line import UP, Line, turn_pose
+from cmg_mj.plant.tilt_line import UP, Line, SupportLine, turn_pose
 
 MAX_SETTLE_S = 10.0
 """Longest time for a robot to come to rest [s]."""
@@ -31,8 +31,15 @@ MAX_LEAN_DEG = 20.0
 """A robot whose mass lies farther from its line of support has fallen, whatever holds it [deg]."""
 STANDS_DEG = 2.0
 """A robot that must lean so far before it falls stands by itself [deg]."""
-LONG_M = 0.02
-"""Contacts farther apart than this along the axis determine its direction [m]."""
+LEFT_DEG = 10.0
+"""A robot that comes to rest nearer to where it was let go stands by itself; farther away, it leans on something
+[deg]."""
+MIN_FRICTION = math.tan(math.radians(STANDS_DEG))
+"""On contacts with less friction a robot slides before it leans by `STANDS_DEG`."""
+MIN_HEIGHT_M = 1e-3
+"""Smallest height of a robot's mass above the line [m]."""
+SEARCH_SHARE, MAX_SEARCH_STEPS, SEARCH_ERROR = 0.125, 5000, 1e-6
+"""The floor is searched in steps of this share of a robot's height, so many at most, and found to a share of a step."""
 
 
 class Support(NamedTuple):
@@ -46,7 +53,7 @@ class Support(NamedTuple):
     """Direction of the line, horizontal, in the world (3,)."""
 
 
-def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray) -> Support:
+def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.ndarray, *, alone: bool = True) -> Support:
     """Let a free robot settle on the floor, its mass above a line through its contacts.
 
     Args:
@@ -55,6 +62,7 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
         joint: The robot's free joint.
         direction: Approximate direction of the line, horizontal, in the world. Contacts far apart determine the line
             better.
+        alone: Whether to see first if it stands by itself in its pose.
 
     Returns:
         The stance and the line.
@@ -62,16 +70,27 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
     Raises:
         InputError: The robot has nothing to stand on, falls over, or stands by itself.
     """
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # physics that fails must say so
     data = posed(model, pose)
     data.act[:], data.ctrl[:] = rest_controls(model, data)  # servos keep the joints where they are
-    mujoco.mj_forward(model, data)
     tree = model.body_rootid == model.body_rootid[model.jnt_bodyid[joint]]
     _touch_down(model, data, tree, model.jnt_qposadr[joint] + 2)
+    if alone:
+        touching = data.qpos.copy()
+        if _rest(model, data, tree, joint, direction, held=False) < LEFT_DEG:
+            _support(model, data, tree, data.subtree_com[model.jnt_bodyid[joint]], direction)
+        data.qpos[:], data.qvel[:] = touching, 0.0
+        mujoco.mj_forward(model, data)
     leaned = 0.0
     for _ in range(MAX_ROUNDS):
-        _rest(model, data, joint, direction)
+        turned = _rest(model, data, tree, joint, direction, held=True)
+        if turned > MAX_LEAN_DEG:
+            raise InputError(
+                f"the robot falls over while it settles, by {turned:.3g} deg, about another line than the one that is "
+                "balanced; give a keyframe in which it stands"
+            )
         mass = data.subtree_com[model.jnt_bodyid[joint]]
-        point, direction = _support(model, data, tree, mass[2], direction)
+        point, direction = _support(model, data, tree, mass, direction)
         arm = mass - point
         lean = math.atan2(arm @ np.cross(direction, UP), arm[2])
         leaned += lean
@@ -91,76 +110,112 @@ def stand(model: mujoco.MjModel, pose: np.ndarray, joint: int, direction: np.nda
 
 
 def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, height: int) -> None:
-    """Lower or lift the robot, whose height has this place in qpos, until it touches the fixed world."""
-    robot = [geom for geom in range(model.ngeom) if tree[model.geom_bodyid[geom]]]
-    floor = [geom for geom in range(model.ngeom) if model.body_weldid[model.geom_bodyid[geom]] == 0]
-    gaps = [
-        mujoco.mj_geomDistance(model, data, here, there, 100.0, None)
-        for here in robot
-        for there in floor
-        if model.geom_contype[here] & model.geom_conaffinity[there]
-        or model.geom_contype[there] & model.geom_conaffinity[here]
-    ]
-    if not gaps or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+    """Lower or lift the robot, whose height has this place in qpos, until a contact begins to push it."""
+
+    def touches(at: float) -> bool:
+        data.qpos[height] = at
+        mujoco.mj_fwdPosition(model, data)
+        return any(contact.dist < contact.includemargin for _, contact, _ in _contacts(model, data, tree))
+
+    geoms = tree[model.geom_bodyid]
+    level, reach = data.geom_xpos[geoms, 2], model.geom_rbound[geoms]
+    step = SEARCH_SHARE * np.ptp([level - reach, level + reach])
+    last = at = data.qpos[height]
+    lifted = touches(at)
+    for _ in range(MAX_SEARCH_STEPS):
+        last, at = at, at + (step if lifted else -step)
+        if touches(at) != lifted:
+            break
+    else:
         raise InputError(
             "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
             'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
         )
-    data.qpos[height] -= min(gaps)
-    mujoco.mj_forward(model, data)
-    # A contact with a margin already pushes at a distance: a robot let down farther is thrown up.
-    depths = [
-        contact.includemargin - contact.dist
-        for contact in data.contact[: data.ncon]
-        if tree[model.geom_bodyid[contact.geom1]] != tree[model.geom_bodyid[contact.geom2]] and contact.includemargin
-    ]
-    data.qpos[height] += max(depths, default=0.0)
+    free, touching = max(last, at), min(last, at)
+    while free - touching > SEARCH_ERROR * step:
+        middle = 0.5 * (free + touching)
+        free, touching = (free, middle) if touches(middle) else (middle, touching)
+    touches(touching)
     mujoco.mj_forward(model, data)
 
 
-def _rest(model: mujoco.MjModel, data: mujoco.MjData, joint: int, direction: np.ndarray) -> None:
-    """Let the robot come to rest, kept from tilting by a torque that vanishes where its mass is above the line."""
-    body, dof = model.jnt_bodyid[joint], model.jnt_dofadr[joint]
-    mass = model.body_subtreemass[body]
-    height = max(data.subtree_com[body][2] - data.xipos[body][2] + 1.0, 0.1)
-    stiffness = 20.0 * mass * np.linalg.norm(model.opt.gravity) * height
-    damping = 2.0 * math.sqrt(stiffness * mass * height**2)
-    drag = mass * 2.0
-    start, off = data.xquat[body].copy(), np.empty(3)
-    for step in range(math.ceil(MAX_SETTLE_S / model.opt.timestep)):
-        mujoco.mju_subQuat(off, start, data.xquat[body])  # in the body's axes
-        along = data.xmat[body].reshape(3, 3).T @ direction
-        torque = along * (stiffness * (off @ along) - damping * (data.qvel[dof + 3 : dof + 6] @ along))
+def _contacts(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray) -> Iterator[tuple[int, Any, int]]:
+    """Yield the contacts of a tree with other bodies: number, contact, other body."""
+    for i, contact in enumerate(data.contact[: data.ncon]):
+        bodies = model.geom_bodyid[contact.geom]
+        ours = tree[bodies]
+        if ours[0] != ours[1]:
+            yield i, contact, bodies[int(ours[0])]
+
+
+def _rest(
+    model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, joint: int, direction: np.ndarray, *, held: bool
+) -> float:
+    """Let the robot come to rest.
+
+    Args:
+        model: The robot.
+        data: The same, touching the floor.
+        tree: Which bodies are the robot's, (nbody,).
+        joint: The robot's free joint.
+        direction: The line about which a torque damps its motion, in the world.
+        held: Whether a torque keeps it from tilting about the line, which vanishes where its mass is above the line.
+            Otherwise it may fall, and is left alone when it has turned by `LEFT_DEG`.
+
+    Returns:
+        The angle by which it has turned [deg].
+    """
+    body, dof, step = model.jnt_bodyid[joint], model.jnt_dofadr[joint], model.opt.timestep
+    mass, gravity = model.body_subtreemass[body], np.linalg.norm(model.opt.gravity)
+    floor = min((contact.pos[2] for _, contact, _ in _contacts(model, data, tree)), default=-math.inf)
+    height = max(data.subtree_com[body][2] - floor, MIN_HEIGHT_M)
+    stiffness = held * 20.0 * mass * gravity * height
+    # By the robot's own height: the inertia about the line is at least mass height^2, and the rate that damping/inertia
+    # is stays below 2 sqrt(20 g/height), which a step of 5 ms integrates from a height of 5 mm.
+    damping = 2.0 * mass * height * math.sqrt((20.0 if held else 1.0) * gravity * height)
+    drag = mass * math.sqrt(gravity / height)
+    start, off, turned = data.xquat[body].copy(), np.empty(3), 0.0
+    for count in range(math.ceil(MAX_SETTLE_S / step)):
+        along = data.xmat[body].reshape(3, 3).T @ direction  # in the body's axes
+        mujoco.mju_subQuat(off, start, data.xquat[body])
+        torque = stiffness * (off @ along) - damping * (data.qvel[dof + 3 : dof + 6] @ along)
         data.qfrc_applied[dof : dof + 3] = -drag * data.qvel[dof : dof + 3]
-        data.qfrc_applied[dof + 3 : dof + 6] = torque
+        data.qfrc_applied[dof + 3 : dof + 6] = along * torque
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qpos).all():
             raise InputError("the robot's physics fails while it settles on the floor")
-        if step * model.opt.timestep > 0.3 and np.abs(data.qvel).max() < AT_REST:
+        turned = math.degrees(np.linalg.norm(off))
+        resting = count * step > 0.3 and np.abs(data.qvel).max() < AT_REST
+        if resting or (turned > LEFT_DEG and not held):
             break
+    data.qfrc_applied[:] = 0.0
     mujoco.mj_forward(model, data)
-    mujoco.mju_subQuat(off, data.xquat[body], start)
-    turned = math.degrees(np.linalg.norm(off))
-    if turned > MAX_LEAN_DEG:
-        raise InputError(
-            f"the robot falls over while it settles, by {turned:.3g} deg, about another line than the one that is "
-            "balanced; give a keyframe in which it stands"
-        )
+    return turned
 
 
 def _support(
-    model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, mass_height: float, direction: np.ndarray
+    model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, mass: np.ndarray, direction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the middle of the contacts, (3,) [m], and the direction of their line, (3,)."""
-    points, loads, force = [], [], np.zeros(6)
-    for i, contact in enumerate(data.contact[: data.ncon]):
+    points, loads, force, friction = [], [], np.zeros(6), 0.0
+    for i, contact, other in _contacts(model, data, tree):
         mujoco.mj_contactForce(model, data, i, force)
-        one, other = tree[model.geom_bodyid[[contact.geom1, contact.geom2]]]
-        if one != other and force[0] > 0.0:
+        if force[0] > 0.0:
+            if model.body_treeid[other] >= 0:
+                raise InputError(
+                    f"the robot rests on the body {model.body(other).name!r}, which moves: let the two not collide "
+                    "(<exclude>), or take that body's joints out of the file"
+                )
             points.append(contact.pos.copy())
             loads.append(force[0])
+            friction = max(friction, contact.friction[0] * (contact.dim > 1))
     if not points:
         raise InputError("the robot does not come to rest on anything")
+    if friction < MIN_FRICTION:
+        raise InputError(
+            f"the robot stands on contacts with a friction of {friction:.2g}, and would slide: give them "
+            f'{MIN_FRICTION:.2g} or more (<geom condim="3" friction="1">, of the feet and the floor)'
+        )
     places = np.array(points)
     middle = np.average(places, axis=0, weights=loads)
     # The principal axis of the loads: a line through the two contacts farthest apart would go through opposite corners
@@ -168,19 +223,23 @@ def _support(
     level = (places - middle)[:, :2]
     along = np.append(np.linalg.eigh(level.T @ (np.array(loads)[:, None] * level))[1][:, 1], 0.0)
     along *= math.copysign(1.0, along @ direction)
-    if np.ptp(places @ along) > LONG_M and along @ direction > math.cos(math.radians(MAX_LEAN_DEG)):
+    least = 2.0 * math.tan(math.radians(STANDS_DEG)) * (mass[2] - middle[2])
+    if np.ptp(places @ along) > least and along @ direction > math.cos(math.radians(MAX_LEAN_DEG)):
         direction = along
-    width = np.ptp(places @ np.cross(direction, UP))
-    if math.degrees(math.atan2(0.5 * width, max(mass_height - middle[2], 1e-9))) > STANDS_DEG:
+    length, width = np.ptp(places @ direction), np.ptp(places @ np.cross(direction, UP))
+    if width > least:
         raise InputError(
             f"the robot stands by itself: its support is {width:.3g} m wide across the axis; a pair balances a robot "
-            "that stands on a line or a point (another --axis?)"
+            "that stands on a line (another --axis?)"
+        )
+    if length < least:
+        raise InputError(
+            f"the robot stands on a point: its support is {length:.3g} m long along the axis, and it would fall "
+            f"sideways too; a pair balances a robot that stands on a line, here of {least:.3g} m or more"
         )
     return middle, direction
 
 
-MIN_HEIGHT_M = 1e-3
-"""Smallest height of a robot's mass above the line [m]."""
 MAX_TRIES = 5
 """Most rounds of settling on the floor and turning the modules along the contact line."""
 
@@ -226,7 +285,8 @@ def stand_upright(
             return model, _all_balanced(model, support, place.joint, others)
         if tries_left:
             joint = model.joint(place.joint).id
-            support, settled = stand(model, support.pose, joint, support.direction), True
+            support = stand(model, support.pose, joint, support.direction, alone=not settled)
+            settled = True
     return model, support
 
 
@@ -283,9 +343,13 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     address = model.jnt_qposadr[joint]
     upright = qpos[address] - sign * lean
     low, high = model.jnt_range[joint]
-    if model.jnt_limited[joint] and not low <= upright <= high:
+    if model.jnt_limited[joint]:  # whole turns away it is upright too
+        upright -= 2.0 * math.pi * round((upright - 0.5 * (low + high)) / (2.0 * math.pi))
+    room = min(upright - low, high - upright) - model.jnt_margin[joint]
+    if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
         raise InputError(
-            f"the hinge {name!r} would stand upright at {upright:.4g} rad, beyond its range of {low:.4g} to {high:.4g}"
+            f"the hinge {name!r} would stand upright at {upright:.4g} rad, at the end of its range of {low:.4g} to "
+            f"{high:.4g} or beyond its range: widen the range, so that it can lean by {STANDS_DEG:g} deg either way"
         )
     qpos = qpos.copy()
     qpos[address] = upright
@@ -300,6 +364,8 @@ MAX_FALL_S = 3.0
 """Longest simulation; a robot whose tilt has not grown so much by then falls too slowly to judge, or stands [s]."""
 SLOWEST = math.acosh(UNTIL) / MAX_FALL_S
 """Slowest fall of a robot that a pair is mounted on [1/s]."""
+FALL_TIME_CONSTANTS = 10.0
+"""Time constants within which `TRIED_DEG` becomes `LEFT_DEG`; 6 on a rigid robot."""
 
 
 def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.0) -> float:
@@ -314,6 +380,16 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
     Returns:
         lambda [1/s]; 0 if the tilt does not grow, and less than `SLOWEST` if it has not grown enough in time.
     """
+    start = math.radians(TRIED_DEG)
+    data, growth = _let_go(model, key, line, start - bias), 1.0
+    while growth < UNTIL and data.time < MAX_FALL_S:
+        mujoco.mj_step(model, data)
+        growth = (line.lean(data.qpos) + bias) / start
+    return math.acosh(growth) / data.time if growth > 1.0 else 0.0
+
+
+def _let_go(model: mujoco.MjModel, key: int, line: Line, tilt: float) -> mujoco.MjData:
+    """Return data at a keyframe, tilted, its flywheels at rest."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, key)
     spinning = data.qvel != 0.0
@@ -322,13 +398,8 @@ def simulated_pole(model: mujoco.MjModel, key: int, line: Line, bias: float = 0.
         joint = model.actuator_trnid[motor, 0]
         if model.actuator_trntype[motor] == mujoco.mjtTrn.mjTRN_JOINT and spinning[model.jnt_dofadr[joint]]:
             data.ctrl[motor] = 0.0
-    start = math.radians(TRIED_DEG)
-    line.tilt(data, start - bias)
-    growth = 1.0
-    while growth < UNTIL and data.time < MAX_FALL_S:
-        mujoco.mj_step(model, data)
-        growth = (line.lean(data.qpos) + bias) / start
-    return math.acosh(growth) / data.time if growth > 1.0 else 0.0
+    line.tilt(data, tilt)
+    return data
 
 
 def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
@@ -344,3 +415,13 @@ def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
             f"that fall with {SLOWEST:.2g} 1/s or faster: it stands by itself, geoms that overlap hold it (let them "
             "not collide: <exclude>), or its mass is far up (--position is in metres)"
         )
+    for side in (TRIED_DEG, -TRIED_DEG) if isinstance(line, SupportLine) else ():
+        data = _let_go(model, key, line, math.radians(side))
+        while abs(line.lean(data.qpos)) < math.radians(LEFT_DEG):
+            mujoco.mj_step(model, data)
+            if data.time > FALL_TIME_CONSTANTS / pole:
+                raise InputError(
+                    f"the robot stands by itself: let go where its mass is above the line, it is still within "
+                    f"{LEFT_DEG:g} deg of there after {data.time:.2g} s, as on the edge of a flat foot; take away what "
+                    "it comes to rest on"
+                )

@@ -224,12 +224,21 @@ def test_a_free_base_within_a_frame_stands_where_it_stood(frame: str, rotation: 
     before = mujoco.MjData(reference)
     mujoco.mj_forward(reference, before)
     result = mount(mujoco.MjSpec.from_string(text), "t", base="free", position=(0.0, 0.0, 0.1))
+    assert not [note for note in result.notes if "keyframes" in note]
     model = result.spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("equilibrium").id)
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.body("t").xpos[:2], before.body("t").xpos[:2], atol=1e-4)
     np.testing.assert_allclose(data.body("t").xmat, before.body("t").xmat, atol=1e-4)
+
+
+def test_a_free_base_says_that_keyframes_are_left_out() -> None:
+    """Their joints are gone."""
+    text = UPRIGHT.format(before="", turned="", more="", after="")
+    text = text.replace("</mujoco>", '<keyframe><key name="home" qpos="0 0 0"/></keyframe></mujoco>')
+    result = mount(mujoco.MjSpec.from_string(text), "t", base="free", position=(0.0, 0.0, 0.1))
+    assert "its keyframes are left out: they have the joints that a free base replaces" in result.notes
 
 
 FLAT = 0.01, 0.003

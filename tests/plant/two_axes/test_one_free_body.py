@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -20,6 +21,7 @@ POST = """
       <freejoint/>
       <geom type="box" size="0.12 0.12 0.16" mass="4"/>
       <geom type="capsule" fromto="0 0 0 0 0 -0.59" size="0.03" mass="0.8" friction="1.5 0.05 0.001" condim="4"/>
+      <geom name="foot" type="capsule" fromto="-0.1 0 -0.59 0.1 0 -0.59" size="0.03" mass="0" condim="4"/>
     </body>
   </worldbody>
 </mujoco>"""
@@ -35,11 +37,11 @@ SET = (
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("post")
-    (folder / "post.xml").write_text(POST, encoding="utf-8")
-    one = mount(folder / "post.xml", body="post", axis="x", scale=1.3, name="roll").save(folder / "one.xml")
-    return mount(one, body="post", axis="y", scale=1.3, name="pitch", position=(0.0, 0.0, 0.55)).save(
-        folder / "two.xml"
-    )
+    one = mount(mujoco.MjSpec.from_string(POST), body="post", axis="x", scale=1.3, name="roll").spec
+    one.geom("foot").fromto = [0.0, -0.1, -0.59, 0.0, 0.1, -0.59]
+    two = mount(one, body="post", axis="y", scale=1.3, name="pitch", position=(0.0, 0.0, 0.55))
+    two.spec.delete(two.spec.geom("foot"))  # on a point, on which no robot is mounted
+    return two.save(folder / "two.xml")
 
 
 def pushed(model: Path, **torques: float) -> Experiment:
