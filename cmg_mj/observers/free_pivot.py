@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
@@ -64,30 +65,32 @@ class FreePivot(GyroFree):
 
     - The sensors' variance is r times that of the datasheet, at least once: vibration is white and no motion of the
       pivot. r is the mean of (y1 - 2 y1- + y1--)^2/(6 var v) over about `noise_s`.
-    - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
-      the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
-      which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
-      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to
-      learn late of a pivot that moves than to suspect one that rests.
+    - S+ = S + share (w^2 + ww - S + innovation_weight S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the
+      estimate after the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and
+      its variance, which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of
+      a mean over all samples, to dt/pivot_s. Where S rises, rise_factor share times the rise is added: at the start it
+      is worse to learn late of a pivot that moves than to suspect one that rests.
+
+    A knock, a heel that strikes or a brake is far from what S allows, and is over or well under way before S is
+    learnt. Taken for tilt it would turn x2 for seconds. So there is a gate before the correction: if e^2 > gate ee,
+    e^2 - ee is added to w's variance, whereby e is as large as its own standard deviation, and nearly all of it w.
 
     Early samples were trusted too much if S then turns out larger:
 
-    - The p that began at y1 took the w of that time for tilt. So doubt share times the rise is added to p's variance
-      and to w's, and taken from their covariance.
+    - The p that began at y1 took the w of that time for tilt. So covariance_boost share times the rise of S is added to
+      p's variance and to w's, and taken from their covariance.
     - The z that y1's differences gave is as uncertain as S was, not as it is found to be. So the covariance of p and z
       is multiplied by 1 + inflation share rise/(S + var y1), the variance of y1's noise by the datasheet.
 
-    While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
-    so many multiplications by dt less.
+    While S is zero, r is one and the gate is shut it is `gyro_free`. All is computed in angles of a sample period, x2
+    dt and alpha dt^2: so many multiplications by dt less.
 
     Attributes:
         dt: Sample period [s].
         model: The reduced model (not used).
         noise: Of tilt and angular acceleration, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
-        bias_start: Standard deviation of the acceleration's offset b at the start [rad/s^2]. On the bundled rig the
-            default stands for 7 mg between the accelerometers, more than in `gyro_free`: a larger offset would look
-            like a pivot that moves.
+        bias_start: Standard deviation of the acceleration's offset b at the start [rad/s^2].
         bias_walk: Random walk of the offset b: its standard deviation after a second [rad/s^2].
         jerk: Standard deviation of the mean acceleration between two samples from that of a straight line [rad/s^2].
         pivot_hz: Corner frequency of the filter's model of w, the pivot's share of y1; not that of the motion [Hz].
@@ -95,24 +98,25 @@ class FreePivot(GyroFree):
         pivot_floor: Least standard deviation of w [rad].
         pivot_s: Time over which the filter learns S, the variance of w [s].
         learn_s: Time over which the filter learns S at the start [s].
-        surprise: Weight of the innovation in the learning of S.
+        innovation_weight: Weight of the innovation in the learning of S.
         noise_s: Time over which the filter learns r, the variance of the measured tilt over the datasheet's [s].
-        hurry: Factor by which S rises faster than it falls, over `share`.
-        doubt: Part of a rise of S that is added to the variance of p, over `share`.
+        rise_factor: Factor by which S rises faster than it falls, over `share`.
+        covariance_boost: Part of a rise of S that is added to the variance of p, over `share`.
         inflation: Factor on the covariance of p and z for a rise of S by the variance of y1, over `share`.
+        gate: Square of an innovation by its variance, above which the excess is put down to the pivot.
     """
 
-    bias_start: Positive = 0.5
-    pivot_hz: Positive = 5.0
-    pivot_start: NonNegative = 2e-3
-    pivot_floor: NonNegative = 1e-3
-    pivot_s: Positive = 1.0
-    learn_s: Positive = 0.05
-    surprise: NonNegative = 4.0
-    noise_s: Positive = 0.3
-    hurry: NonNegative = 60.0
-    doubt: NonNegative = 10.0
-    inflation: NonNegative = 10.0
+    pivot_hz: Positive = 6.2
+    pivot_start: NonNegative = 1.5e-3
+    pivot_floor: NonNegative = 1.5e-3
+    pivot_s: Positive = 0.33
+    learn_s: Positive = 0.02
+    innovation_weight: NonNegative = 0.58
+    noise_s: Positive = 0.32
+    rise_factor: NonNegative = 53.0
+    covariance_boost: NonNegative = 29.0
+    inflation: NonNegative = 21.0
+    gate: Annotated[float, Field(ge=1.0)] = 11.5
 
     def __post_init__(self) -> None:
         GyroFree.__post_init__(self)
@@ -139,28 +143,28 @@ class FreePivot(GyroFree):
         bend = step - state.step
         scale = state.scale + self._shares[2] * (self._per_bend * bend * bend - state.scale)
 
-        e, ee, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
+        ratio, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
         alpha, p, z, _, w = means
         x1, x2 = p + 1.0 / 6.0 * alpha, (z + 0.5 * alpha) * (1.0 / self.dt)
 
         # Learn how strongly the pivot moves.
         ww, pivot, share = covariance[9], state.pivot, state.share
-        rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        weight, floor = self.innovation_weight, self.pivot_floor**2
+        rise = share * (w * w + ww + pivot * (weight * ratio - (1.0 + weight)))
         early = share * where(rise > 0.0, rise, 0.0)
-        pivot = pivot + rise + self.hurry * early
-        floor = self.pivot_floor**2
+        pivot = pivot + rise + self.rise_factor * early
         pivot = where(pivot > floor, pivot, floor)
         slower = share / (1.0 + share)
         share = where(slower > self._shares[0], slower, self._shares[0])
 
         return self._advance(means, covariance, early, (scale, pivot, share, y.y1, step)), x1, x2
 
-    def _correct(self, state: State, y: Measurement, r: Scalar) -> tuple[Scalar, Scalar, Scalars, Scalars]:
-        """Correct p, z, b, w, n by e = y1 - p - w - d alpha.
+    def _correct(self, state: State, y: Measurement, r: Scalar) -> tuple[Scalar, Scalars, Scalars]:
+        """Correct p, z, b, w, n by e = y1 - p - w - d alpha, its excess put down to w.
 
         Returns:
-            e, its variance, the means of alpha, p, z, b, w, and the covariance of p, z, b, w and of m = b + n, which is
-            alpha's error: its rows.
+            e^2 by its variance, the means of alpha, p, z, b, w, and the covariance of p, z, b, w and of m = b + n,
+            which is alpha's error: its rows.
         """
         h, d = self.dt, 1.0 / 6.0
         c, nn, rest = self._noise
@@ -171,6 +175,9 @@ class FreePivot(GyroFree):
         ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
         en = r * ((c - d) * nn)
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
+        square = e * e
+        excess = where(square > self.gate * ee, square - ee, 0.0)
+        ww, ew, ee = ww + excess, ew + excess, ee + excess
         kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
 
@@ -179,7 +186,7 @@ class FreePivot(GyroFree):
         pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
         mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
-        return e, ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
+        return square / ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
 
     def _advance(self, means: Scalars, covariance: Scalars, early: Scalar, learnt: Scalars) -> State:
         """Doubt early samples, and advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white."""
@@ -188,8 +195,8 @@ class FreePivot(GyroFree):
         pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm = covariance
         scale, pivot, share, y1, step = learnt
 
-        doubt = self.doubt * early
-        pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
+        boost = self.covariance_boost * early
+        pp, pw, ww = pp + boost, pw - boost, ww + boost
         inflate = 1.0 + self.inflation * early / (pivot + self.noise.tilt**2)
         pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
 
