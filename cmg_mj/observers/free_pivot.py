@@ -71,9 +71,8 @@ class FreePivot(GyroFree):
       a mean over all samples, to dt/pivot_s. Where S rises, rise_factor share times the rise is added: at the start it
       is worse to learn late of a pivot that moves than to suspect one that rests.
 
-    A knock, a heel that strikes or a brake is far from what S allows, and is over or well under way before S is
-    learnt. Taken for tilt it would turn x2 for seconds. So there is a gate before the correction: if e^2 > gate ee,
-    e^2 - ee is added to w's variance, whereby e is as large as its own standard deviation, and nearly all of it w.
+    A knock is far from what S allows, and is over before S is learnt; taken for tilt it would turn x2 for seconds. So,
+    before the correction, if e^2 > gate ee, e^2 - ee is added to w's variance: nearly all of e is then w.
 
     Early samples were trusted too much if S then turns out larger:
 
@@ -127,12 +126,9 @@ class FreePivot(GyroFree):
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
         zero, h = 0.0 * y.y1, self.dt
         p = y.y1 - h * h * y.acceleration / 6.0  # so that the first sample shows what is expected
-        zz, bb, ww = (
-            (h * self.rate_start) ** 2 + zero,
-            (h * h * self.bias_start) ** 2 + zero,
-            self.pivot_start**2 + zero,
-        )
-        known = (1.0 + zero, zero, zero, zero, zz, zero, zero, bb, zero, ww)
+        one, ww = 1.0 + zero, self.pivot_start**2 + zero
+        zz, bb = (h * self.rate_start) ** 2 * one, (h * h * self.bias_start) ** 2 * one
+        known = (one, zero, zero, zero, zz, zero, zero, bb, zero, ww)
         learnt = (1.0 + zero, ww, self._shares[1] + zero, y.y1, zero)
         return self._sample(State(p, zero, zero, zero, *known, *learnt), y)[0]
 
@@ -149,10 +145,10 @@ class FreePivot(GyroFree):
 
         # Learn how strongly the pivot moves.
         ww, pivot, share = covariance[9], state.pivot, state.share
-        weight, floor = self.innovation_weight, self.pivot_floor**2
-        rise = share * (w * w + ww + pivot * (weight * ratio - (1.0 + weight)))
+        rise = share * (w * w + ww - pivot + pivot * self.innovation_weight * (ratio - 1.0))
         early = share * where(rise > 0.0, rise, 0.0)
         pivot = pivot + rise + self.rise_factor * early
+        floor = self.pivot_floor**2
         pivot = where(pivot > floor, pivot, floor)
         slower = share / (1.0 + share)
         share = where(slower > self._shares[0], slower, self._shares[0])
