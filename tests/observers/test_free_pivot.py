@@ -33,7 +33,7 @@ def test_while_the_pivot_rests_it_is_gyro_free() -> None:
 def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Estimates of x1, x2 and the learnt S of the samples after the first, in rad and seconds, by textbook matrices.
 
-    States are p, z, b, w and the sample's n. The numbers are those of docs/assumptions.md. Also: how often the gate
+    States are p, z, b, w and the sample's n. The numbers are the defaults. Also: how often the gate
     opened.
     """
     f, d, H = math.exp(-2.0 * math.pi * 6.2 * DT), DT**2 / 6.0, np.array([1.0, 0.0, -(DT**2) / 6.0, 1.0, 0.0])
