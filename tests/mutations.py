@@ -108,11 +108,11 @@ MUTATIONS = [
     ),
     *(
         Mutation(
-            f"free_pivot: {name}", OBSERVERS + "free_pivot.py", rf"\n    {name}: (?:Positive|NonNegative) = " + NUMBER
+            f"free_pivot: {name}", OBSERVERS + "free_pivot.py", rf"\n    {name}: \w[^=\n]*(?:=1.0[^=\n]*)? = " + NUMBER
         )
         for name in (
-            *("bias_start", "pivot_hz", "pivot_start", "pivot_floor"),  # the others are those of gyro_free
-            *("pivot_s", "learn_s", "surprise", "noise_s", "hurry", "doubt", "inflation"),
+            *("pivot_hz", "pivot_start", "pivot_floor", "pivot_s"),  # the others are those of gyro_free
+            *("learn_s", "innovation_weight", "noise_s", "rise_factor", "covariance_boost", "inflation", "gate"),
         )
     ),
     Mutation("super_twisting: L", OBSERVERS + "linear.py", r"    L: Positive = " + NUMBER),

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
+from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, where
@@ -64,21 +65,24 @@ class FreePivot(GyroFree):
 
     - The sensors' variance is r times that of the datasheet, at least once: vibration is white and no motion of the
       pivot. r is the mean of (y1 - 2 y1- + y1--)^2/(6 var v) over about `noise_s`.
-    - S+ = S + share (w^2 + ww - S + surprise S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the estimate after
-      the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and its variance,
-      which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of a mean over
-      all samples, to dt/pivot_s. Where S rises, hurry share times the rise is added: at the start it is worse to
-      learn late of a pivot that moves than to suspect one that rests.
+    - S+ = S + share (w^2 + ww - S + innovation_weight S (e^2/ee - 1)), at least pivot_floor^2. w and ww are the
+      estimate after the sample and its variance: a step of expectation-maximisation. e and ee are the innovation and
+      its variance, which tell sooner that S is wrong by much. `share` is dt/learn_s at the start and falls, as that of
+      a mean over all samples, to dt/pivot_s. Where S rises, rise_factor share times the rise is added: at the start it
+      is worse to learn late of a pivot that moves than to suspect one that rests.
+
+    A knock is far from what S allows, and is over before S is learnt; taken for tilt it would turn x2 for seconds. So,
+    before the correction, if e^2 > gate ee, e^2 - ee is added to w's variance: nearly all of e is then w.
 
     Early samples were trusted too much if S then turns out larger:
 
-    - The p that began at y1 took the w of that time for tilt. So doubt share times the rise is added to p's variance
-      and to w's, and taken from their covariance.
+    - The p that began at y1 took the w of that time for tilt. So covariance_boost share times the rise of S is added to
+      p's variance and to w's, and taken from their covariance.
     - The z that y1's differences gave is as uncertain as S was, not as it is found to be. So the covariance of p and z
       is multiplied by 1 + inflation share rise/(S + var y1), the variance of y1's noise by the datasheet.
 
-    While S is zero and r is one it is `gyro_free`. All is computed in angles of a sample period, x2 dt and alpha dt^2:
-    so many multiplications by dt less.
+    While S is zero, r is one and the gate is shut it is `gyro_free`. All is computed in angles of a sample period, x2
+    dt and alpha dt^2: so many multiplications by dt less.
 
     Attributes:
         dt: Sample period [s].
@@ -95,11 +99,12 @@ class FreePivot(GyroFree):
         pivot_floor: Least standard deviation of w [rad].
         pivot_s: Time over which the filter learns S, the variance of w [s].
         learn_s: Time over which the filter learns S at the start [s].
-        surprise: Weight of the innovation in the learning of S.
+        innovation_weight: Weight of the innovation in the learning of S.
         noise_s: Time over which the filter learns r, the variance of the measured tilt over the datasheet's [s].
-        hurry: Factor by which S rises faster than it falls, over `share`.
-        doubt: Part of a rise of S that is added to the variance of p, over `share`.
+        rise_factor: Factor by which S rises faster than it falls, over `share`.
+        covariance_boost: Part of a rise of S that is added to the variance of p, over `share`.
         inflation: Factor on the covariance of p and z for a rise of S by the variance of y1, over `share`.
+        gate: Square of an innovation by its variance, above which the excess is put down to the pivot.
     """
 
     bias_start: Positive = 0.5
@@ -108,11 +113,12 @@ class FreePivot(GyroFree):
     pivot_floor: NonNegative = 1e-3
     pivot_s: Positive = 1.0
     learn_s: Positive = 0.05
-    surprise: NonNegative = 4.0
+    innovation_weight: NonNegative = 4.0
     noise_s: Positive = 0.3
-    hurry: NonNegative = 60.0
-    doubt: NonNegative = 10.0
+    rise_factor: NonNegative = 60.0
+    covariance_boost: NonNegative = 10.0
     inflation: NonNegative = 10.0
+    gate: Annotated[float, Field(ge=1.0)] = 11.5
 
     def __post_init__(self) -> None:
         GyroFree.__post_init__(self)
@@ -123,12 +129,9 @@ class FreePivot(GyroFree):
         """Start at rest at the measured tilt, with no bias; of the tilt nothing else is known."""
         zero, h = 0.0 * y.y1, self.dt
         p = y.y1 - h * h * y.acceleration / 6.0  # so that the first sample shows what is expected
-        zz, bb, ww = (
-            (h * self.rate_start) ** 2 + zero,
-            (h * h * self.bias_start) ** 2 + zero,
-            self.pivot_start**2 + zero,
-        )
-        known = (1.0 + zero, zero, zero, zero, zz, zero, zero, bb, zero, ww)
+        one, ww = 1.0 + zero, self.pivot_start**2 + zero
+        zz, bb = (h * self.rate_start) ** 2 * one, (h * h * self.bias_start) ** 2 * one
+        known = (one, zero, zero, zero, zz, zero, zero, bb, zero, ww)
         learnt = (1.0 + zero, ww, self._shares[1] + zero, y.y1, zero)
         return self._sample(State(p, zero, zero, zero, *known, *learnt), y)[0]
 
@@ -139,15 +142,15 @@ class FreePivot(GyroFree):
         bend = step - state.step
         scale = state.scale + self._shares[2] * (self._per_bend * bend * bend - state.scale)
 
-        e, ee, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
+        ratio, means, covariance = self._correct(state, y, where(scale > 1.0, scale, 1.0))
         alpha, p, z, _, w = means
         x1, x2 = p + 1.0 / 6.0 * alpha, (z + 0.5 * alpha) * (1.0 / self.dt)
 
         # Learn how strongly the pivot moves.
         ww, pivot, share = covariance[9], state.pivot, state.share
-        rise = share * (w * w + ww + pivot * (self.surprise * (e * e / ee) - (1.0 + self.surprise)))
+        rise = share * (w * w + ww - pivot + pivot * self.innovation_weight * (ratio - 1.0))
         early = share * where(rise > 0.0, rise, 0.0)
-        pivot = pivot + rise + self.hurry * early
+        pivot = pivot + rise + self.rise_factor * early
         floor = self.pivot_floor**2
         pivot = where(pivot > floor, pivot, floor)
         slower = share / (1.0 + share)
@@ -155,12 +158,12 @@ class FreePivot(GyroFree):
 
         return self._advance(means, covariance, early, (scale, pivot, share, y.y1, step)), x1, x2
 
-    def _correct(self, state: State, y: Measurement, r: Scalar) -> tuple[Scalar, Scalar, Scalars, Scalars]:
-        """Correct p, z, b, w, n by e = y1 - p - w - d alpha.
+    def _correct(self, state: State, y: Measurement, r: Scalar) -> tuple[Scalar, Scalars, Scalars]:
+        """Correct p, z, b, w, n by e = y1 - p - w - d alpha, its excess put down to w.
 
         Returns:
-            e, its variance, the means of alpha, p, z, b, w, and the covariance of p, z, b, w and of m = b + n, which is
-            alpha's error: its rows.
+            e^2 by its variance, the means of alpha, p, z, b, w, and the covariance of p, z, b, w and of m = b + n,
+            which is alpha's error: its rows.
         """
         h, d = self.dt, 1.0 / 6.0
         c, nn, rest = self._noise
@@ -171,6 +174,9 @@ class FreePivot(GyroFree):
         ep, ez, eb, ew = pp + pw - d * pb, pz + zw - d * zb, pb + bw - d * bb, pw + ww - d * bw
         en = r * ((c - d) * nn)
         ee = ep + ew - d * eb + r * ((c - d) * (c - d) * nn + rest)
+        square = e * e
+        excess = where(square > self.gate * ee, square - ee, 0.0)
+        ww, ew, ee = ww + excess, ew + excess, ee + excess
         kp, kz, kb, kw, kn = ep / ee, ez / ee, eb / ee, ew / ee, en / ee
         p, z, b, w, n = p + kp * e, z + kz * e, b + kb * e, w + kw * e, kn * e
 
@@ -179,7 +185,7 @@ class FreePivot(GyroFree):
         pw, zw, bw, ww = pw - kp * ew, zw - kz * ew, bw - kb * ew, ww - kw * ew
         pm, zm, bm, wm = pb - kp * en, zb - kz * en, bb - kb * en, bw - kw * en
         mm = bm - kn * eb + r * nn - kn * en + (h * h * self.jerk) ** 2
-        return e, ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
+        return square / ee, (a - b - n, p, z, b, w), (pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm)
 
     def _advance(self, means: Scalars, covariance: Scalars, early: Scalar, learnt: Scalars) -> State:
         """Doubt early samples, and advance: p+ = r + alpha with r = p + z, z+ = z + alpha, w+ = f w + white."""
@@ -188,8 +194,8 @@ class FreePivot(GyroFree):
         pp, pz, pb, pw, zz, zb, zw, bb, bw, ww, pm, zm, bm, wm, mm = covariance
         scale, pivot, share, y1, step = learnt
 
-        doubt = self.doubt * early
-        pp, pw, ww = pp + doubt, pw - doubt, ww + doubt
+        boost = self.covariance_boost * early
+        pp, pw, ww = pp + boost, pw - boost, ww + boost
         inflate = 1.0 + self.inflation * early / (pivot + self.noise.tilt**2)
         pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
 

@@ -32,15 +32,14 @@ CELLS = {
 FALLS = "pivot 0.5 m/s2 to 1 Hz"
 VARIANTS: list[dict[str, float]] = [
     {},
-    {"inflation": 0.0},
-    {"doubt": 0.0},
-    {"hurry": 0.0},
-    {"surprise": 2.0},
+    {"gate": 1e9},
+    {"covariance_boost": 0.0},
+    {"rise_factor": 0.0},
+    {"innovation_weight": 0.0},
     {"learn_s": 0.5},
-    {"pivot_s": 0.5},
-    {"bias_start": 0.35},
-    {"pivot_hz": 3.0},
-    {"pivot_hz": 8.0},
+    {"pivot_s": 1.0},
+    {"pivot_hz": 2.0},
+    {"pivot_hz": 10.0},
 ]
 
 

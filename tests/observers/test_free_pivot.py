@@ -30,10 +30,11 @@ def test_while_the_pivot_rests_it_is_gyro_free() -> None:
     np.testing.assert_allclose(estimates, expected, rtol=0.0, atol=1e-12)
 
 
-def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Estimates of x1, x2 and the learnt S of the samples after the first, in rad and seconds, by textbook matrices.
 
-    States are p, z, b, w and the sample's n. The numbers are those of docs/assumptions.md.
+    States are p, z, b, w and the sample's n. The numbers are the defaults. Also: how often the gate
+    opened.
     """
     f, d, H = math.exp(-2.0 * math.pi * 5.0 * DT), DT**2 / 6.0, np.array([1.0, 0.0, -(DT**2) / 6.0, 1.0, 0.0])
     H[4] = C - d
@@ -42,11 +43,15 @@ def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     drive = np.array([DT**2, DT, 0.0, 0.0, 0.0])
     x, P = np.array([y1[0] - d * a[0], 0.0, 0.0, 0.0, 0.0]), np.diag([1.0, 0.02**2, 0.5**2, 0.002**2, 0.0])
     r, S, share, bends = 1.0, 0.002**2, DT / 0.05, np.diff(np.append([y1[0]] * 2, y1), 2)
-    rows, variances = [], []
+    rows, variances, opened = [], [], 0
     for k in range(len(y1)):
         r += DT / 0.3 * (bends[k] ** 2 / (6.0 * NOISE.tilt**2) - r)
         P[4, 4] = max(r, 1.0) * NOISE.acceleration**2
-        e, ee = y1[k] - d * a[k] - H @ x, H @ P @ H + max(r, 1.0) * INDEPENDENT**2
+        e, own = y1[k] - d * a[k] - H @ x, max(r, 1.0) * INDEPENDENT**2
+        if e**2 > 11.5 * (H @ P @ H + own):
+            P[3, 3] += e**2 - H @ P @ H - own
+            opened += 1
+        ee = H @ P @ H + own
         K = P @ H / ee
         x, P = x + K * e, P - np.outer(K, H @ P)
         alpha = a[k] - x[2] - x[4]
@@ -61,28 +66,30 @@ def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         P[2, 2] += 0.01**2 * DT
         P[3, 3] += (1.0 - f * f) * S
         variances.append(S)
-    return np.array(rows[1:]), np.array(variances[1:])
+    return np.array(rows[1:]), np.array(variances[1:]), opened
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03])
 def test_it_is_its_equations_in_matrices(sigma: float) -> None:
-    """Learning included, with the defaults."""
+    """Learning and knocks included, with the defaults."""
     rng = np.random.default_rng(8)
     *_, y1, a = motion(300, rng, bias=0.4)
     y1 = y1 + shares_of_y1(300, sigma, 5.0, rng)
+    y1[200:203] += 0.6
     estimates, states = run(free_pivot(), y1, a=a)
-    expected, variances = by_matrices(y1, a)
+    expected, variances, opened = by_matrices(y1, a)
     np.testing.assert_allclose(estimates[:, :2], expected, rtol=1e-7, atol=1e-10)
     np.testing.assert_allclose([state.pivot for state in states[1:]], variances, rtol=1e-7)
+    assert opened >= 2
 
 
-def test_a_rise_at_the_start_adds_to_the_doubt_about_the_tilt() -> None:
+def test_a_rise_at_the_start_makes_the_tilt_uncertain() -> None:
     """Without it the error in the first one and a half seconds on a strong pivot is larger by a tenth."""
     rng = np.random.default_rng(9)
     worlds, n = 60, 300
     _, x2, _, y1, a = np.transpose([motion(n, rng, bias=0.0) for _ in range(worlds)], (1, 2, 0))
     y1 = y1 + np.transpose([shares_of_y1(n, 0.05, 15.0, rng) for _ in range(worlds)])
-    estimates = (run(free_pivot(**doubt), y1, a=a)[0][:, 1] for doubt in ({}, {"doubt": 0.0}))
+    estimates = (run(free_pivot(**boost), y1, a=a)[0][:, 1] for boost in ({}, {"covariance_boost": 0.0}))
     errors, without = (math.sqrt(np.square(estimate - x2[1:]).mean()) for estimate in estimates)
     assert errors < 0.9 * without
 
@@ -114,6 +121,29 @@ def test_it_does_not_take_vibration_for_the_pivots_motion() -> None:
     assert math.sqrt(np.mean([state.pivot for state in states[400:]])) < 0.01
 
 
+def knocks(acceleration: float, seconds: float) -> str:
+    """Three knocks across, as a setting."""
+    knock = f'kind="step", acceleration_m_s2={acceleration}, duration_s={seconds}'
+    return "pivot=[" + ", ".join(f"{{{knock}, start_s={start}}}" for start in (3.0, 7.0, 11.0)) + "]"
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "seconds", "most"), [(10.0, 0.01, 0.026), pytest.param(20.0, 0.02, 0.035, marks=pytest.mark.slow)]
+)
+def test_knocks_pass_it_by(acceleration: float, seconds: float, most: float) -> None:
+    """In its own loop on the bench; without the gate it has five times the error, and falls at the stronger ones."""
+    setting = knocks(acceleration, seconds)
+    own, base = (
+        push_recovery("seed=170000", setting, 'open_loop_observers=["gyro_free"]', observer=kind).run_many(
+            6, keep_trajectory=False
+        )
+        for kind in ("free_pivot", "gyro_free")
+    )
+    assert own.stood.all()
+    assert (own.values(ERROR) < most).all()
+    assert own.values(ERROR).mean() < 0.6 * base.values(ERROR)[base.stood].mean()
+
+
 PIVOT = 'pivot=[{kind="noise", acceleration_m_s2=0.5, corner_hz=5.0}]'
 ERROR = "velocity_rms_error_rad_s"
 
@@ -134,12 +164,12 @@ def test_after_a_second_it_has_settled_as_far_as_it_can(setting: str, most: floa
 @pytest.mark.parametrize(
     ("setting", "most", "most_in_a_world"),
     [
-        ("seed=160000", 1.01, 1.1),
+        ("seed=160000", 1.02, 1.1),
         (PIVOT, 0.35, 0.6),
     ],
 )
 def test_in_open_loop_it_keeps_to_its_share_of_gyro_free(setting: str, most: float, most_in_a_world: float) -> None:
-    """At rest it loses nothing; on a strong pivot it has a third of the error."""
+    """At rest it loses a hundredth; on a strong pivot it has a third of the error."""
     open_loop = "seed=160000", "controller.feedback=truth", 'open_loop_observers=["free_pivot"]'
     result = push_recovery(*open_loop, setting, observer="gyro_free").run_many(24, keep_trajectory=False)
     assert result.stood.all()

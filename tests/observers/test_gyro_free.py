@@ -16,8 +16,10 @@ from cmg_mj.observers.gyro_free import GyroFree, State
 from tests.observers.double_integrator import INDEPENDENT, C, least_squares, motion, shares_of_y1
 from tests.observers.reference import DT, NOISE, PAPER, run
 
-NEVER: dict[str, Any] = {"surprise": 0.0, "pivot_s": 1e12, "learn_s": 1e12, "noise_s": 1e12}
-"""Nothing is learnt: a Kalman filter with the variances that it is told."""
+NEVER: dict[str, Any] = {"innovation_weight": 0.0, "gate": 1e12} | dict.fromkeys(
+    ("pivot_s", "learn_s", "noise_s"), 1e12
+)
+"""Nothing is learnt and the gate is shut: a Kalman filter with the variances that it is told."""
 
 
 def gyro_free(**parameters: Any) -> GyroFree:
