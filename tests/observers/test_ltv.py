@@ -9,8 +9,6 @@ import pytest
 from scipy.linalg import expm
 
 from tests.observers.reference import HEAVY, PAPER, integrate, ltv_slope, observer, rough_signals, run
-from tests.recorded import push_recovery, recorded
-from tests.tiers import slow_but
 
 C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -24,24 +22,6 @@ def relative_errors(package_step: np.ndarray, reference: np.ndarray) -> float:
     """Largest relative error of the entries that are not zero by structure."""
     mask = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], dtype=bool)
     return float(np.abs(package_step[..., mask] / reference[..., mask] - 1.0).max())
-
-
-@pytest.mark.parametrize("duration_s", slow_but([1.0, 4.0], 1.0))
-def test_in_a_closed_loop_it_is_the_reference_integration(duration_s: float) -> None:
-    """With sensor noise and a push in the middle, from the record alone: there is no other memory."""
-    trajectory = recorded(
-        push_recovery(f"duration_s={duration_s}", f"push.0.start_s={duration_s / 2.0}", observer="ltv").run()
-    )
-    y1, y2, u = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    reference = integrate(ltv_slope(), np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()]), y1, y2, u)
-    estimates, states = run(observer("ltv"), y1, y2, u)
-    H, expected = np.array([riccati_matrix(state) for state in states[1:]]), reference[:, 3:].reshape(-1, 3, 3)
-    assert relative_errors(H, expected) < 1e-6
-    assert np.abs(expected[:, [0, 1, 2, 2], [2, 2, 0, 1]]).max() < 1e-9  # the third state decouples
-    assert np.linalg.eigvalsh(H).min() > 0.5
-    np.testing.assert_array_less(np.abs(estimates - reference[:, :3]).max(axis=0), [2e-6, 5e-5, 1e-12])
-    recorded_estimates = [trajectory[f"estimate/ltv/{name}"][1:] for name in ("x1_rad", "x2_rad_s", "x3_rad")]
-    np.testing.assert_allclose(recorded_estimates, estimates.T, rtol=0.0, atol=1e-9)
 
 
 CASES = [
