@@ -64,7 +64,13 @@ def test_what_it_writes() -> None:
     np.testing.assert_array_equal(signals["reference_rad_s"], sine()["gyro_rad_s"])
     assert "estimate/linear/x2_rad_s" in signals.columns
     entities = {str(chunk.entity_path) for chunk in RrdReader("it/recording.rrd").stream()}
-    assert {"/sine/tilt/measured", "/sine/rate/true", "/sine/rate_estimate/linear", "/summary", "/settings"} <= entities
+    assert {
+        "/sine/tilt/measured",
+        "/sine/rate/true",
+        "/sine/rate_estimate/1_linear",
+        "/summary",
+        "/settings",
+    } <= entities
 
 
 @pytest.mark.slow

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
-import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -22,7 +17,7 @@ from cmg_mj.features.sweeps import study as study_module
 from cmg_mj.features.sweeps.chunks import Store, hash_of, resolved, run
 from cmg_mj.features.sweeps.study import SweepStudy, Trial
 from cmg_mj.inputs.files import folder
-from tests.command import COMMAND, ROOT, cmg_mj
+from tests.command import cmg_mj
 from tests.features.sweeps.synthetic_trials import BIAS, VELOCITY, make_study
 
 SWEEP = ["sweep", "push_recovery", "--vary", f"{BIAS}=0,1", "--worlds", "2", "--set", "push=[]"]
@@ -84,7 +79,7 @@ def test_every_flipped_bit_is_noticed(whole: Store) -> None:
     content = path.read_bytes()
     table = whole.read(0)
     assert table is not None
-    for place in range(0, len(content), 7):
+    for place in range(0, len(content), 23):
         flipped = bytearray(content)
         flipped[place] ^= 1 << place % 8
         path.write_bytes(flipped)
@@ -169,28 +164,3 @@ def test_a_disk_that_is_full_is_one_line_and_the_sweep_resumes(tmp_path: Path, m
 def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert cmg_mj(*SWEEP, tmp_path / "file" / "out").complaint.startswith(f"--out {tmp_path / 'file' / 'out'}: cannot")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
-def test_killed_at_random_moments(tmp_path: Path) -> None:
-    """The same command again and again, until it is done: the same trials as in one go."""
-    longer = ["--vary", "controller.rate_hz=100,200", "--set", "duration_s=4", "--worlds", "40", "--out"]
-    uninterrupted, interrupted = tmp_path / "whole", tmp_path / "killed"
-    cmg_mj(*SWEEP[:-1], *longer, uninterrupted)
-    rng = np.random.default_rng(5)
-    for kill in range(int(os.environ.get("CMG_MJ_KILLS", "3"))):
-        process = subprocess.Popen(
-            [*COMMAND, *SWEEP[:-1], *longer, str(interrupted)],
-            stderr=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            cwd=ROOT,
-        )
-        time.sleep(rng.uniform(0.5, 6.0))
-        process.kill()
-        process.wait()
-        if kill % 3 == 2:  # all over again, now and then
-            shutil.rmtree(interrupted / "chunks", ignore_errors=True)
-    assert cmg_mj(*SWEEP[:-1], *longer, interrupted).status == 0
-    for name in ("trials.parquet", "cells.parquet"):
-        assert (interrupted / name).read_bytes() == (uninterrupted / name).read_bytes()
