@@ -115,11 +115,6 @@ def test_as_many_experiments_as_worlds() -> None:
 # --- stacked -------------------------------------------------------------------------------------------------
 
 
-def test_what_is_equal_stays_as_it_is() -> None:
-    assert stack_worlds([Sensors(), Sensors()]) == Sensors()
-    assert stack_worlds([1.0, 1.0]) == 1.0
-
-
 def test_a_stack_gives_every_world_its_own_back() -> None:
     worlds = [Sensors(Accelerometer(bias_mg=(0.0, float(i))), fog=Fog(bias_deg_h=float(i))) for i in range(3)]
     stack = stack_worlds(worlds)
