@@ -26,17 +26,12 @@ def relative_errors(package_step: np.ndarray, reference: np.ndarray) -> float:
 
 CASES = [
     pytest.param({}, PAPER, id="Table 2"),
-    pytest.param({"Q": (300.0, 5e6, 1.0)}, PAPER, id="Q1"),
-    pytest.param({"Q": (1.0, 2e4, 1.0)}, PAPER, id="Q2"),
-    pytest.param({"Q": (1.0, 5e6, 900.0)}, PAPER, id="Q3"),
-    pytest.param({"H0": (40.0, 1.0, 1.0)}, PAPER, id="H0 1"),
-    pytest.param({"H0": (1.0, 3e4, 1.0)}, PAPER, id="H0 2"),
-    pytest.param({"H0": (1.0, 1.0, 0.1)}, PAPER, id="H0 3"),
+    pytest.param({"Q": (300.0, 2e4, 900.0)}, PAPER, id="Q"),
+    pytest.param({"H0": (40.0, 3e4, 0.1)}, PAPER, id="H0"),
     pytest.param({"Q": (1.0, 100.0, 1.0)}, HEAVY, id="another rig"),
 ]
 
 
-@pytest.mark.daily_cases("Table 2", "another rig", "Q2")
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_continuous_observer(parameters: dict, model) -> None:
     y1, y2, u = rough_signals(100)

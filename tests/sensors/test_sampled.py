@@ -206,13 +206,10 @@ COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s"
     [
         pytest.param(200.0, 0.0, [0, 5, 10, 15, 20, 25], id="control rate"),
         pytest.param(100.0, 0.0, [0, 0, 10, 10, 20, 20], id="slower is held"),
-        pytest.param(1000.0, 0.0, [0, 5, 10, 15, 20, 25], id="faster shows the newest"),
         pytest.param(125.0, 0.0, [0, 0, 8, 8, 16, 24], id="no multiple of the other"),
         pytest.param(200.0, 0.005, [0, 0, 5, 10, 15, 20], id="one period late"),
-        pytest.param(200.0, 0.003, [0, 0, 5, 10, 15, 20], id="late by less than a period"),
         pytest.param(1000.0, 0.003, [0, 2, 7, 12, 17, 22], id="fast and late"),
         pytest.param(200.0, 0.012, [0, 0, 0, 0, 5, 10], id="late by more than two periods"),
-        pytest.param(50.0, 0.01, [0, 0, 0, 0, 0, 0], id="slow and late"),
     ],
 )
 def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, expected: list[int]) -> None:
