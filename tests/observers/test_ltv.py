@@ -46,16 +46,13 @@ def test_follows_the_continuous_observer(parameters: dict, model) -> None:
 
 EXTREMES = [
     pytest.param(dt, (q1, q2, q3), steps, id=f"{dt:g} s, Q = {q1:g}, {q2:g}, {q3:g}")
-    for dt in (0.001, 0.005, 0.05)
+    for dt in (0.001, 0.05)
     for q1, q2, q3, steps in (
-        (1.0, 5e6, 1.0, 200),
-        (1e-3, 1e-3, 1e-3, 200),
+        (1.0, 5e6, 1.0, 100),
         (1e-3, 1e12, 1e6, 25),
         (1e6, 1e-3, 1.0, 25),
-        (1e6, 1e6, 1e6, 25),
-        (1e6, 1e12, 1e-3, 25),
     )
-] + [pytest.param(0.001, (1e12, q2, 1.0), 3, id=f"0.001 s, Q = 1e+12, {q2:g}, 1") for q2 in (1e-3, 1e12)]
+] + [pytest.param(0.001, (1e12, 1e12, 1.0), 3, id="0.001 s, Q = 1e+12, 1e+12, 1")]
 
 
 @pytest.mark.parametrize(("dt", "weights", "steps"), EXTREMES)

@@ -92,10 +92,9 @@ def test_every_flipped_bit_is_noticed(whole: Store) -> None:
     [
         lambda path: path.write_bytes(path.read_bytes()[:100]),
         lambda path: pq.write_table(pq.read_table(path)[1:], path),
-        lambda path: path.write_bytes(b""),
         lambda path: shutil.copy(path.with_name("000004.parquet"), path),
     ],
-    ids=["the first bytes alone", "a row less", "no byte", "another chunk"],
+    ids=["the first bytes alone", "a row less", "another chunk"],
 )
 def test_a_damaged_chunk_is_computed_again(whole: Store, harm: Callable[[Path], object]) -> None:
     harm(whole.path(2))

@@ -11,7 +11,6 @@ import pytest
 from cmg_mj.features.tuning import tune
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import CommandOutcome, cmg_mj
-from tests.features.tuning.user_observer import USER_OBSERVER
 
 QUICK = "title = 'Quick'\nduration_s = 0.6\n[[push]]\nstart_s = 0.2"
 
@@ -86,11 +85,6 @@ def test_an_interruption_keeps_the_noises_that_are_done(quick: str) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         tune(scenario, worlds=2, noise_ug_rthz=[200.0, 400.0], on_share=stop_at_once)
-
-
-def test_a_users_own_observer_by_its_path(quick: str) -> None:
-    outcome = cmg_mj("tune", quick, "--observer", USER_OBSERVER, "--worlds", 2, "--json")
-    assert json.loads(outcome.out)["tuned"] == ["gain"]
 
 
 @pytest.mark.parametrize(
