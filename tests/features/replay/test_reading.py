@@ -385,9 +385,9 @@ PACKET_STAMPS = {
 @pytest.mark.parametrize("rows", [slice(None), slice(1, -1)])
 def test_packets_are_refused_with_the_cure(kind: str, rows: slice, tmp_path: Path) -> None:
     columns = {**sine(), "t_s": PACKET_STAMPS[kind](np.arange(N))}
-    for options in ({}, {"max_gap_s": 0.5}):
+    for max_gap_s in (None, 0.5):
         with pytest.raises(InputError, match=r"leave time out and give --rate (\d+\.?\d*)$") as info:
-            read(tmp_path, {name: values[rows] for name, values in columns.items()}, **options)
+            read(tmp_path, {name: values[rows] for name, values in columns.items()}, max_gap_s=max_gap_s)
         assert float(str(info.value).split()[-1]) == pytest.approx(200.0, rel=0.005)
 
 
