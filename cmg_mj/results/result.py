@@ -189,8 +189,6 @@ class Result(NamedColumns):
             raise InputError(
                 f"split({count}): {worlds} worlds do not make {count} equal groups. Give a divisor of {worlds}"
             )
-        if count == 1:
-            return [self]
         size = worlds // count
         return [self.select(slice(i * size, (i + 1) * size)) for i in range(count)]
 
