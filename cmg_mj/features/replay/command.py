@@ -113,7 +113,7 @@ def log_options(command: Command) -> Command:
             texts = assignments(options[name], f"--{name}")
             options[name] = {role: finite(text, f"--{name} {role}") for role, text in texts.items()}
         if options["radii_m"] is not None:
-            options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
+            options["radii_m"] = pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
             options["time_range_s"] = span(options["time_range_s"], "--time-range")
         command(options=ReadOptions(**options), **given)
@@ -121,7 +121,8 @@ def log_options(command: Command) -> Command:
     return all_of(*_OPTIONS)(with_options)
 
 
-def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
+def pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
+    """Parse two finite numbers with a separator between, such as an option's `0.05,0.15`."""
     first, _, second = text.partition(separator)
     try:
         pair = float(first), float(second)
@@ -134,7 +135,7 @@ def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, 
 
 def span(text: str, option: str) -> tuple[float, float]:
     """Parse `10:60` into its ends [s]."""
-    start, end = _pair(text, ":", option, "START:END in seconds, such as 10:60")
+    start, end = pair(text, ":", option, "START:END in seconds, such as 10:60")
     if not start < end:
         raise InputError(f"{option} {text}: must end after its start")
     return start, end

@@ -104,7 +104,7 @@ def test_a_users_own_observer_by_its_path(quick: str) -> None:
         ),
         (["--observer", "linear", "--noise-levels", "100,loud"], "--noise-levels '100,loud': must be numbers"),
         (["--observer", "linear", "--noise-levels", ","], "--noise-levels ',': must be numbers"),
-        (["--observer", "linear", "--range", "tau"], "--range 'tau': write NAME=LOW:HIGH"),
+        (["--observer", "linear", "--range", "tau"], "--range tau = '': write NAME=LOW:HIGH"),
         (["--observer", "linear", "--range", "tau=3:1"], "--range tau=3:1: must be two positive numbers"),
         (["--observer", "linear", "--range", "L=1:3"], "--range L: not tuned; tuned: tau"),
         (["--observer", "linear", "--worlds", "1"], "Invalid value for '--worlds'"),
