@@ -222,14 +222,8 @@ def _summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
         parts = [estimates_table("", figures, keys, named=False).markdown() for keys in ROW_TABLES]
         lost = [branch for branch in branches if branch.run.outcome.kind != "done"]
         parts += [BOLD, *(f"**{branch.label}**: {outcomes[branch.label]}" for branch in lost)]
-    torques = [
-        f"push of {push.torque_n_m:+g} N m{_about(push.axis)} for {push.duration_s:g} s at {push.start_s:g} s"
-        for push in header.pushes
-    ]
-    for swing in header.swings:
-        end = "to the end" if swing.duration_s is None else f"for {swing.duration_s:g} s"
-        sine = f"{swing.amplitude_n_m:g} N m{_about(swing.axis)} at {swing.frequency_hz:g} Hz"
-        torques.append(f"swing of {sine} from {swing.start_s:g} s {end}")
+    torques = [f"push of {push.words}" for push in header.pushes]
+    torques += [f"swing of {swing.words}" for swing in header.swings]
     return _paragraphs(
         f"# {header.title or 'Run'}",
         *parts,
@@ -238,10 +232,6 @@ def _summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
         *(f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason),
         NOTES,
     )
-
-
-def _about(axis: str | None) -> str:
-    return f" about {axis}" if axis else ""
 
 
 def _estimates(branch: Branch, alone: bool) -> list[str]:
