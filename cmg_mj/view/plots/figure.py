@@ -175,7 +175,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
     for line in panel.lines:
         color = f"C{line.color}" if isinstance(line.color, int) else palette.get(line.color or "", line.color)
-        style = {"linewidth": line.width, "label": line.label or None}
+        label = line.label.lstrip("_")  # matplotlib hides one that begins with an underscore
+        style = {"linewidth": line.width, "label": label or None}
         if color is not None:  # the format may have one
             style["color"] = color
         (curve,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)
