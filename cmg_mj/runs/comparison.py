@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.core.types import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import BASELINES
-from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
+from cmg_mj.results.intervals import finite_mean, finite_values, known_ends
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, section
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -237,13 +237,13 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
     leaders = {key: ComparisonRow(observer) for key, observer in best.items() if observer}
     standing = []
     for row in comparison_rows(compared):
-        intervals = {key: _ends(row.values(key), KEYS[key].positive) for key in keys}
+        intervals = {key: known_ends(row.values(key), KEYS[key].positive) for key in keys}
         minus_best = {}
         for key, leader in leaders.items():
             if row != leader:
                 less = row.values(key) - leader.values(key)  # world by world
                 mean, worlds = finite_mean(less), len(finite_values(less))
-                minus_best[key] = {"best": leader.name, "worlds": worlds, "mean": mean, "interval": _ends(less)}
+                minus_best[key] = {"best": leader.name, "worlds": worlds, "mean": mean, "interval": known_ends(less)}
         standing.append(finite(row.summary | {"intervals": intervals, "minus_best": minus_best}))
     return standing
 
@@ -251,8 +251,3 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
 def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
     """Make a table of every world of every row of a comparison, as `Result.table` does."""
     return as_table(world for row in comparison_rows(compared) for world in row.entry.result.rows(row.reference))
-
-
-def _ends(values: np.ndarray, positive: bool = False) -> list[float] | None:
-    interval = known_interval(values, positive)
-    return None if interval is None else [interval.low, interval.high]

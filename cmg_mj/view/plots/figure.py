@@ -21,6 +21,8 @@ ROW_OF_LABELS = 110
 """Characters of a legend that fit into a row."""
 HEIGHT, FIRST_HEIGHT, SMALL_HEIGHT = 2.3, 1.6, 1.25
 """Heights of a panel, of a first one and of a small one below [inch]."""
+LOGARITHMIC = 10.0
+"""Values that differ by more than this factor have a logarithmic scale."""
 PAGE_WIDTH, COLUMN_WIDTH = 9.0, 5.5
 """Widths of a page, and of each of several columns [inch]."""
 
@@ -122,6 +124,12 @@ def pyplot() -> ModuleType:
     import matplotlib.pyplot as plt
 
     return plt
+
+
+def scale_of(values: np.ndarray) -> Literal["linear", "log"]:
+    """Choose a logarithmic scale for positive values of more than one decade."""
+    known = values[np.isfinite(values)]
+    return "log" if 0.0 < LOGARITHMIC * known.min() < known.max() else "linear"
 
 
 def save_figure(path: Path, figure: Figure, title: str, dpi: int) -> None:
