@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.errors import counted
 from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fall_shares, least, least_error, with_ends
-from cmg_mj.features.sweeps.study import VariedField, counted
+from cmg_mj.features.sweeps.study import VariedField
 from cmg_mj.results.summary_keys import heading
 from cmg_mj.view.plots.figure import pyplot, scale_of
 from cmg_mj.view.plots.style import colours, hexadecimal

@@ -356,11 +356,6 @@ class SweepStudy:
         }
 
 
-def counted(n: int, noun: str) -> str:
-    """Put a number before a noun: `1 world`, `2 worlds`."""
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
-
-
 def sampled(dimensions: int, n: int, seed: int) -> np.ndarray:
     """Spread points evenly in the unit cube, (n, dimensions)."""
     from scipy.stats import qmc  # half a second
