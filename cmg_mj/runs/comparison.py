@@ -64,15 +64,8 @@ class ComparedObserver:
                 "stopped_fraction": len(self.stopped) / worlds,
                 "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
                 **{key: result.mean(key) for key in result.summaries[0] if key not in NESTED},
-                "velocity_rms_error_std_rad_s": standard_deviation(result.values("velocity_rms_error_rad_s")),
             }
         )
-
-
-def standard_deviation(values: np.ndarray) -> float | None:
-    """Compute the standard deviation over the worlds that have a figure, (n_worlds,); None of fewer than two."""
-    known = finite_values(values)
-    return float(known.std(ddof=1)) if len(known) > 1 else None
 
 
 def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Experiment]:
@@ -197,7 +190,6 @@ class ComparisonRow:
             "in_loop_of": self.entry.kind,
             **{key: loop[key] for key in ("seed", "differs", "worlds")},
             **{key: finite_mean(self.values(key)) for key in loop if key in KEYS},
-            "velocity_rms_error_std_rad_s": standard_deviation(self.values(ERROR)),
         }
 
 

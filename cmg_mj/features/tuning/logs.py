@@ -182,7 +182,6 @@ class LogSegments(ScoringData):
             for rows in np.array_split(np.flatnonzero(log.scored(settle_s) & np.isfinite(log[REFERENCE])), BLOCKS)
             if len(rows)
         ]
-        self.largest_acceleration = max(float(np.nanmax(np.abs(np.diff(log[REFERENCE]) / log.dt))) for log in logs)
 
     def rates(self, observers: Sequence[Observer]) -> list[np.ndarray]:
         """See `ScoringData`."""

@@ -62,8 +62,6 @@ class Recorded(ScoringData):
         self.trajectory, self.fell = trajectory, fell
         self.references = [trajectory["fog_rad_s"]]
         self.stretches = [(0, inside(trajectory["time_s"], windows))]
-        steps = np.diff(trajectory["x2_rad_s"], axis=0) / np.diff(trajectory["time_s"])[:, None]
-        self.largest_acceleration = float(np.abs(steps).max(initial=0.0))
 
     def rates(self, observers: Observer) -> list[np.ndarray]:
         """See `ScoringData`."""
