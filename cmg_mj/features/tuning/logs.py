@@ -248,15 +248,11 @@ class LogStudy(Study):
 
     def closing(self) -> Iterator[str]:
         """Say why there is no verdict, or a tie, and what the tuned parameters do in a closed loop."""
-        ratio = self.level.ratio
         if self.verdict is None:
             short = f"No interval: the scored stretches are {self.stretch_s:.2g} s short"
             yield f"{short}; there is one from {MIN_STRETCH_S:g} s on."
-        elif self.verdict == "tie" and ratio.low <= 1.0 <= ratio.high:
-            yield "A tie: the difference is not beyond chance."
-        elif self.verdict == "tie" and math.isfinite(ratio.mean):
-            off, least = abs(ratio.mean - 1.0), RELEVANT - 1.0
-            yield f"A tie: {off:.2%} of difference, where less than {least:.0%} counts for none."
+        elif self.verdict == "tie":
+            yield f"A tie: the difference is not beyond chance, or is less than {RELEVANT - 1.0:.0%}."
         if self.loop is not None:
             yield self.loop.remark
 
