@@ -26,10 +26,10 @@ from cmg_mj.cli.terminal import (
     final_path,
     note,
     note_hints,
+    open_recording,
     own_stdout,
     progress,
     say_written,
-    shell_command,
     show,
     users_code,
 )
@@ -106,9 +106,7 @@ def run(
             place = runs.save_run(folder, report, plot=plot)
         finally:
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
-    say_written(
-        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
-    )
+    say_written(folder, place, open_recording(place), arguments.as_json)
     outcome, where = result.outcomes[0], final_path(folder, place)
     if outcome.kind == "stopped":
         raise RunStopped(f"{outcome.reason}; what was recorded until then is in {where}")
@@ -177,9 +175,7 @@ def compare(
             title = f"{scenario.title or arguments.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, arguments.as_json)
-    say_written(
-        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
-    )
+    say_written(folder, place, open_recording(place), arguments.as_json)
     for entry in compared:
         if entry.stopped:
             note(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")

@@ -23,9 +23,9 @@ from cmg_mj.cli.terminal import (
     CtrlC,
     end_interrupted,
     final_path,
+    open_recording,
     progress,
     say_written,
-    shell_command,
     show,
     users_code,
 )
@@ -229,6 +229,6 @@ def replay(
         finally:
             table = report.replay_markdown(results) if markdown else report.replay_tables(results)
             show(finite(report.replay_figures(results)), table, as_json)
-    say_written(folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", as_json)
+    say_written(folder, place, open_recording(place), as_json)
     if ctrl_c.noted or len(results) < total:
         end_interrupted(f"interrupted; {len(results)} of {total} logs are in {final_path(folder, place)}")

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     "log:first:last:count. With --sample also low:high. Fields joined by + take the same values. May be "
     "given again: the sweep runs every combination.",
 )
-@observers_option("the scenario's", distinct=False, baselines=True)
+@observers_option("the scenario's", baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
