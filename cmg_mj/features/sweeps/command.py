@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
 )
-@click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
+@click.option("--dry-run", is_flag=True, help="Print the number of trials and the time, and run nothing.")
 @click.option(
     "--cluster",
     metavar="ADDRESS",
@@ -85,14 +85,14 @@ def sweep(
         cost = estimate_cost(study)
         text = (
             "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks; "
-            "about {minutes:.2g} min on this machine, {memory_mb:.0f} MB"
+            "about {minutes:.2g} min on this machine"
         )
         show(cost, text.format(**cost), arguments.as_json)
         return
     if study.trials > MAX_TRIALS and not yes:
         raise InputError(
             f"{study.n_points} points, {study.trials} trials: for more than {MAX_TRIALS} give --yes "
-            "(--dry-run prints time and memory)"
+            "(--dry-run prints the time)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with running as run:

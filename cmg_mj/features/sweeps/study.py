@@ -188,8 +188,6 @@ BASELINE_LOOP = "linear"
 """Observer that runs where a baseline's trials have the true rate in the loop; nothing depends on it."""
 BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim_s": 0.0}
 """Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
-MAX_ALONE = 200
-"""Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
 
 
 @dataclass(frozen=True)
@@ -379,15 +377,14 @@ def check_values(study: SweepStudy) -> None:
     bases = [study.scenario_with(observer) for observer in study.observers]
     for base in bases:
         prepare(base, plant)
+    alone = len(study.axes) == 1  # a value takes 5 ms
     for axis in study.axes:
         of_observer = any(field.startswith("observer.") for field in axis.fields)
         if of_observer and study.baselines:
             raise InputError(f"--vary {axis.option}: a baseline has no parameters; leave {study.baselines[0]} out")
-        values = axis.values or (axis.low, axis.high)
-        for i, value in enumerate(values):
+        for value in axis.values or (axis.low, axis.high):
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
-            alone = len(study.axes) == 1 and (i < MAX_ALONE or i == len(values) - 1)
             for base in bases if of_observer else bases[:1]:
                 fields = base.as_fields()
                 for field in axis.fields:
