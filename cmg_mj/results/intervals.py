@@ -99,8 +99,8 @@ def known_ends(values: Sequence[float] | np.ndarray, positive: bool = False) -> 
     return None if interval is None else [interval.low, interval.high]
 
 
-def finite_values(values: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Discard what is not finite, as of worlds that fell, (n,) -> (n_finite,)."""
+def finite_values(values: Sequence[float | None] | np.ndarray) -> np.ndarray:
+    """Discard what is None or not finite, as of worlds that fell, (n,) -> (n_finite,)."""
     sample = np.asarray(values, dtype=float)
     return sample[np.isfinite(sample)]
 

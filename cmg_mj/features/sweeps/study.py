@@ -21,7 +21,7 @@ from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
 from cmg_mj.inputs.files import find, read_toml, whole_path
 from cmg_mj.inputs.messages import complaints
-from cmg_mj.inputs.overrides import assign, override
+from cmg_mj.inputs.overrides import assign, value_of
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import Plant, load_scenario_plant
@@ -159,10 +159,7 @@ def _parse_list(text: str, where: str) -> list[Any]:
         words = [word.strip() for word in text.split(",")]
         if "" in words or any(mark in text for mark in "[]{}\"'="):
             raise InputError(f"{where}: {text!r} is no list; write values with commas between") from None
-        values: dict[str, Any] = {}
-        for place, word in enumerate(words):
-            override(values, f"{place}={word}")
-        return list(values.values())
+        return [value_of(word) for word in words]
 
 
 # --- the study
