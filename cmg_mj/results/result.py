@@ -81,6 +81,11 @@ class Result(NamedColumns):
         """True for each world that fell, (n_worlds,)."""
         return np.array([outcome.fell for outcome in self.outcomes])
 
+    @property
+    def interrupted(self) -> bool:
+        """True if the user interrupted the run."""
+        return any(outcome.kind == "interrupted" for outcome in self.outcomes)
+
     def values(self, key: str, estimator: str | None = None) -> np.ndarray:
         """Return one number of every world's summary.
 

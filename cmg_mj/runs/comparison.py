@@ -118,10 +118,10 @@ def compare(
         result = experiment.run_many(
             worlds, keep_trajectory=False, on_progress=partial(report, i, experiment.scenario.duration_s)
         )
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        if result.interrupted:
             break
         world_0 = experiment.run(on_progress=partial(report, i + 1, math.inf))
-        if world_0.outcomes[0].kind == "interrupted":
+        if world_0.interrupted:
             break
         compared.append(ComparedObserver(experiment, result, world_0))
     return compared

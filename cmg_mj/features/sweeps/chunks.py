@@ -84,7 +84,7 @@ def compute(
             results.update(dict.fromkeys(batch, unfinished("stopped", raised(error))))
             stopped = list(batch) if len(batch) > 1 else []
         else:
-            if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+            if result.interrupted:
                 raise KeyboardInterrupt
             rows = result.rows(observer if observer in study.baselines else None)
             results.update(zip(batch, rows, strict=True))

@@ -156,7 +156,7 @@ def compare_in_loop(
     except InputError as error:
         return LoopComparison(title, duration, worlds, refused=str(error))
     results = run_jobs([run_of(experiment, worlds) for experiment in experiments], keep_trajectory=False)
-    if any(outcome.kind == "interrupted" for result in results for outcome in result.outcomes):
+    if any(result.interrupted for result in results):
         raise KeyboardInterrupt
     tilts = [result.values("tilt_rms_deg") for result in results]
     both = np.isfinite(tilts).all(axis=0)

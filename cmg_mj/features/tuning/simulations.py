@@ -118,7 +118,7 @@ def recorder(
     jobs = [BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds) for worlds, noise in requests]
     windows, recordings = windows_of(scenario), {}
     for request, job, result in zip(requests, jobs, run_jobs(jobs), strict=True):
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        if result.interrupted:
             raise KeyboardInterrupt
         loop, stood = job.experiments[0].scenario, result.stood
         if stood.sum() < 2:
