@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -218,6 +218,6 @@ def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
 
 
 def _flicker(floor: float, dt: float) -> Struct:
-    """Compute the numbers of 1/f noise, as `Flicker` does."""
-    sigma, decay = spread_of(floor), np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
-    return {"flicker_sigma": sigma, "decay": decay.tolist(), "spread": (sigma * np.sqrt(1.0 - decay**2)).tolist()}
+    """Return the numbers of 1/f noise."""
+    noise = FlickerNoise(floor, dt, np.zeros(len(CORNERS_HZ)))
+    return {"flicker_sigma": spread_of(floor), "decay": noise.decay.tolist(), "spread": noise.spread.tolist()}
