@@ -49,11 +49,11 @@ class RunArguments:
     out: str | None
     as_json: bool
 
-    def scenario(self, observer: str | None = None) -> Scenario:
-        """Load the scenario and apply the options."""
+    def scenario(self, observer: str | None = None, fields: dict[str, Any] | None = None) -> Scenario:
+        """Load the scenario, or take its fields, and apply the options."""
         from cmg_mj.scenario.loading import load_scenario
 
-        scenario = load_scenario(self.name, self.settings, observer)
+        scenario = load_scenario(self.name, self.settings, observer, fields)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
     def folder(self, label: str, experiment: Experiment, driver: str = "native", world: int = 0) -> RunFolder:

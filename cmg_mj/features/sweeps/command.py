@@ -125,7 +125,6 @@ def _study(
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.features.sweeps.study import SweepStudy, locate_tracks, parse_axis, read_study
     from cmg_mj.inputs.files import find
-    from cmg_mj.scenario.loading import load_scenario
 
     settings = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
@@ -135,9 +134,7 @@ def _study(
     if isinstance(file.scenario, str):
         scenario = replace(arguments, name=file.scenario).scenario()
     else:
-        scenario = load_scenario(arguments.name, arguments.settings, fields=file.scenario)
-        if arguments.seed is not None:
-            scenario = scenario.model_copy(update={"seed": arguments.seed})
+        scenario = arguments.scenario(fields=file.scenario)
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
     return SweepStudy(
         scenario,
