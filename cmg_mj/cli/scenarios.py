@@ -38,7 +38,7 @@ from cmg_mj.inputs.features import DRIVERS
 from cmg_mj.inputs.files import read_toml
 
 
-@click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
+@click.command()
 @observer_option()
 @run_options
 @click.option(
@@ -116,7 +116,7 @@ def run(
         end_interrupted(f"interrupted at the end; the complete run is in {where}")
 
 
-@click.command(short_help="Run several observers on the same plant, pushes and noise.")
+@click.command()
 @observers_option("the scenario's [compare], or all")
 @run_options
 @worlds_option(
@@ -186,7 +186,7 @@ def compare(
         sys.exit(WRONG_INPUT)
 
 
-@click.command("list", short_help="List the bundled scenarios, the observers and the control laws.")
+@click.command("list")
 @click.argument("what", type=click.Choice(["scenarios", "observers", "laws"]), required=False)
 def list_names(what: str | None) -> None:
     """List the bundled scenarios, the observers and the control laws.
@@ -205,7 +205,7 @@ def list_names(what: str | None) -> None:
     click.echo("\n\n".join(lists[name]() for name in ([what] if what else lists)))
 
 
-@click.command(short_help="Check a scenario file, or a model file, without running it.")
+@click.command()
 @click.argument("file")
 @settings_option("Set a field of the scenario, as cmg-mj run does.")
 @users_code()

@@ -10,7 +10,7 @@ from cmg_mj.cli.arguments import RunArguments, claim_output, export_options, jso
 from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 
 
-@click.command(short_help="Write an observer and the control law around it as C code.")
+@click.command()
 @out_option()
 @click.option(
     "--precision",

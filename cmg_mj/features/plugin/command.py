@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from cmg_mj.features.plugin.make import Start
 
 
-@click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
+@click.command()
 @out_option()
 @click.option(
     "--name", metavar="NAME", help="Name of the plugin, behind the prefix cmg_mj.  [default: OBSERVER's name]"

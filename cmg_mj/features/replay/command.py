@@ -141,7 +141,7 @@ def span(text: str, option: str) -> tuple[float, float]:
     return start, end
 
 
-@click.command(short_help="Replay your own log through every observer.")
+@click.command()
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")

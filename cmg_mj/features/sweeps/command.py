@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cmg_mj.features.sweeps.study import SweepStudy
 
 
-@click.command(short_help="Run a scenario with varied fields, observers and noise.")
+@click.command()
 @run_options
 @click.option(
     "--vary",

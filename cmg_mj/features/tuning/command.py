@@ -51,7 +51,7 @@ parameter_options = all_of(
 """The options that select the parameters to tune."""
 
 
-@click.command(short_help="Fit an observer's parameters to the gyro of a scenario.")
+@click.command()
 @observer_option("to tune")
 @run_options
 @worlds_option(
@@ -114,7 +114,7 @@ def tune(
         end_interrupted(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
 
 
-@click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
+@click.command("tune-log")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @observer_option("to tune", required=True)
 @log_options
