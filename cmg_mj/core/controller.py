@@ -180,8 +180,7 @@ class Controller:
 
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""
-        accelerometers, encoders, fog = self._sampled
-        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), self._true_rate).u
+        u = self.decide(step, *self.readings(step), self._true_rate).u
         if self.turns_gimbals:
             self.command_rate(u)
 
