@@ -122,7 +122,7 @@ class Controller:
         observers = [observer, *self.open_loop_observers.values()]
         self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
-        self._law = LawRunner(law, self._single, len(self.extra_signals[0]))
+        self._law = LawRunner(law, self._single)
         self.reset()
 
     @property
