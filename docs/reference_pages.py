@@ -21,7 +21,7 @@ import click
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from cmg_mj.cli import HELP, cli
+from cmg_mj.cli import HELP, Commands, cli
 from cmg_mj.features.bend import Bend
 from cmg_mj.features.export.constants import attribute_descriptions
 from cmg_mj.features.pivot import FIELDS_OF, Pivot
@@ -845,8 +845,8 @@ def commands_page(page: str) -> str:
     parts = [_prose(COMMANDS_HEAD if is_first else TOOLS_HEAD)]
     if is_first:
         rows = [
-            [f"[`cmg-mj {words}`]({_page_of(words)}#cmg-mj-{words.replace(' ', '-')})", _short(command), _takes(words)]
-            for words, command in sorted(commands.items(), key=lambda item: ORDER.index(item[0].split()[0]))
+            [f"[`cmg-mj {words}`]({_page_of(words)}#cmg-mj-{words.replace(' ', '-')})", _short(words), _takes(words)]
+            for words in sorted(commands, key=lambda words: ORDER.index(words.split()[0]))
         ]
         parts.append(TABLE_HEAD.strip() + "\n" + "\n".join(f"| {' | '.join(cells)} |" for cells in rows))
         parts += [_wrapped(text) for text in HELP.split("\n\n") if text.startswith(("Ctrl-C", "Exit status", "A scen"))]
@@ -862,8 +862,8 @@ def _page_of(words: str) -> str:
     return next(page for page, names in COMMAND_PAGES.items() if words.split()[0] in names)
 
 
-def _short(command: click.Command) -> str:
-    return _cell(command.short_help or "")
+def _short(words: str) -> str:
+    return _cell(Commands.table[words].help)
 
 
 def _takes(words: str) -> str:

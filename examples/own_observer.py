@@ -16,6 +16,7 @@ class HalfDifference:
     """The tilt's difference quotient, of which each sample takes a part."""
 
     needs = ()  # but y1: it replays on any log
+    elementwise = True  # takes arrays (n_worlds,) as well as floats: many worlds run together
 
     dt: float
     model: cmg_mj.ReducedModel

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,11 +49,11 @@ class RunArguments:
     out: str | None
     as_json: bool
 
-    def scenario(self, observer: str | None = None) -> Scenario:
-        """Load the scenario and apply the options."""
+    def scenario(self, observer: str | None = None, fields: dict[str, Any] | None = None) -> Scenario:
+        """Load the scenario, or take its fields, and apply the options."""
         from cmg_mj.scenario.loading import load_scenario
 
-        scenario = load_scenario(self.name, self.settings, observer)
+        scenario = load_scenario(self.name, self.settings, observer, fields)
         return scenario if self.seed is None else scenario.model_copy(update={"seed": self.seed})
 
     def folder(self, label: str, experiment: Experiment, driver: str = "native", world: int = 0) -> RunFolder:
@@ -114,27 +114,23 @@ def observer_option(role: str = "in the loop", **choice: Any) -> Decorator:
     )
 
 
-def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: bool = False) -> Decorator:
+def observers_option(otherwise: str = "", *, baselines: bool = False) -> Decorator:
     """Make the option `--observers`, whose value is a list of names.
 
     Args:
         otherwise: The default in words, for the value None; without them it is all observers.
-        distinct: Whether a repeated name counts once.
-        baselines: Whether baselines that give a rate, such as `zero`, may be named too.
+        baselines: Whether baselines that give a rate, such as `zero`, may be named too; the command then checks names.
     """
 
     def parse(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
         from cmg_mj.observers import OBSERVERS
-        from cmg_mj.results.baselines import RATES
 
         if text is None:
             return None
         names = list(OBSERVERS) if text == "all" else names_in(text)
         if not names:
             raise InputError(f"--observers {text!r}: give names separated by commas, or all")
-        allowed = RATES if baselines else ()
-        names = [name if name in allowed else check_observer("--observers", name, allowed) for name in names]
-        return list(dict.fromkeys(names)) if distinct else names
+        return names if baselines else list(dict.fromkeys(check_observer("--observers", name) for name in names))
 
     default = f"  [default: {otherwise}]" if otherwise else ""
     more = "; baselines: zero, mems_as_bought, mems_gyro, mems_fused" if baselines else ""
@@ -146,6 +142,22 @@ def observers_option(otherwise: str = "", *, distinct: bool = True, baselines: b
         callback=parse,
         help=f"Observers separated by commas, or all; your own as package.module:Class{more}.{default}",
     )
+
+
+def export_options(command: Command) -> Command:
+    """Add the arguments of every command that writes a scenario's controller as C."""
+    options = all_of(
+        click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name)),
+        click.option(
+            "--scenario",
+            default="push_recovery",
+            show_default=True,
+            metavar="NAME",
+            help="Scenario that gives the plant, the sensors, the gains and the rates.",
+        ),
+        settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400."),
+    )
+    return options(command)
 
 
 def seed_option() -> Decorator:
@@ -215,13 +227,12 @@ def names_in(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def check_observer(option: str, name: str, others: Sequence[str] = ()) -> str:
-    """Refuse an observer that does not exist, or return its name; the message knows others that are allowed."""
+def check_observer(option: str, name: str) -> str:
+    """Refuse an observer that does not exist, or return its name."""
     from cmg_mj.observers import OBSERVERS
 
     if ":" not in name and name not in OBSERVERS:
         raise InputError(
-            f"{option} {name!r}: no such observer; {nearest(name, [*OBSERVERS, *others])}, or your own as "
-            "package.module:Class"
+            f"{option} {name!r}: no such observer; {nearest(name, OBSERVERS)}, or your own as package.module:Class"
         )
     return name

@@ -17,8 +17,6 @@ from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings
-from cmg_mj.stages.push import Push
-from cmg_mj.stages.swing import Swing
 
 OWN_CODE = "your own code, which was imported and tried on two samples"
 
@@ -42,10 +40,6 @@ def description(name: str, part: Experiment) -> str:
     compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     imperfections = scenario.sensors.accelerometer.imperfections
-    torques = [
-        ("push", f"{p.torque_n_m:g} N m{_about(p)} from {p.start_s:g} s to {p.end_s:g} s") for p in scenario.push
-    ]
-    torques += [("swing", f"{s.amplitude_n_m:g} N m at {s.frequency_hz:g} Hz{_about(s)}") for s in scenario.swing]
     missing = list(omissions(scenario).values())
     judgements = [judge(design, part.plant) for judge in entries("judge").values()]
     rows = [
@@ -61,7 +55,8 @@ def description(name: str, part: Experiment) -> str:
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         ("", imperfections and f"accelerometer: {assignments(imperfections)}"),
         ("compare", compare and f"{', '.join(compare.names())}; {compare.worlds} worlds"),
-        *torques,
+        *(("push", push.words) for push in scenario.push),
+        *(("swing", swing.words) for swing in scenario.swing),
         *_pivot_rows(part.plant),
         ("omitted", missing and f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"),
         *(row for judgement in judgements for row in judgement.rows),
@@ -69,10 +64,6 @@ def description(name: str, part: Experiment) -> str:
         *(("hint", hint) for judgement in judgements for hint in judgement.hints),
     ]
     return lines(f"{name}{f', axis {axis}' if axis else ''}: valid", rows)
-
-
-def _about(torque: Push | Swing) -> str:
-    return "" if torque.axis is None else f" about {torque.axis}"
 
 
 def _pivot_rows(plant: Plant) -> Iterator[tuple[str, str]]:

@@ -26,10 +26,10 @@ from cmg_mj.cli.terminal import (
     final_path,
     note,
     note_hints,
+    open_recording,
     own_stdout,
     progress,
     say_written,
-    shell_command,
     show,
     users_code,
 )
@@ -38,7 +38,7 @@ from cmg_mj.inputs.features import DRIVERS
 from cmg_mj.inputs.files import read_toml
 
 
-@click.command(short_help="Run a scenario: summary, trajectory, rerun recording.")
+@click.command()
 @observer_option()
 @run_options
 @click.option(
@@ -106,9 +106,7 @@ def run(
             place = runs.save_run(folder, report, plot=plot)
         finally:
             show(report.summary, tables.summary_table(report.summary), arguments.as_json)
-    say_written(
-        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
-    )
+    say_written(folder, place, open_recording(place), arguments.as_json)
     outcome, where = result.outcomes[0], final_path(folder, place)
     if outcome.kind == "stopped":
         raise RunStopped(f"{outcome.reason}; what was recorded until then is in {where}")
@@ -118,7 +116,7 @@ def run(
         end_interrupted(f"interrupted at the end; the complete run is in {where}")
 
 
-@click.command(short_help="Run several observers on the same plant, pushes and noise.")
+@click.command()
 @observers_option("the scenario's [compare], or all")
 @run_options
 @worlds_option(
@@ -177,9 +175,7 @@ def compare(
             title = f"{scenario.title or arguments.name}: {worlds} worlds an observer, seed {scenario.seed}{differs}"
             table = report.comparison_markdown(summaries) if markdown else report.comparison_table(summaries, title)
             show(summaries, table, arguments.as_json)
-    say_written(
-        folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", arguments.as_json
-    )
+    say_written(folder, place, open_recording(place), arguments.as_json)
     for entry in compared:
         if entry.stopped:
             note(f"{entry.kind}: {len(entry.stopped)} of {worlds} worlds stopped: {entry.stopped[0].reason}")
@@ -190,7 +186,7 @@ def compare(
         sys.exit(WRONG_INPUT)
 
 
-@click.command("list", short_help="List the bundled scenarios, the observers and the control laws.")
+@click.command("list")
 @click.argument("what", type=click.Choice(["scenarios", "observers", "laws"]), required=False)
 def list_names(what: str | None) -> None:
     """List the bundled scenarios, the observers and the control laws.
@@ -209,7 +205,7 @@ def list_names(what: str | None) -> None:
     click.echo("\n\n".join(lists[name]() for name in ([what] if what else lists)))
 
 
-@click.command(short_help="Check a scenario file, or a model file, without running it.")
+@click.command()
 @click.argument("file")
 @settings_option("Set a field of the scenario, as cmg-mj run does.")
 @users_code()

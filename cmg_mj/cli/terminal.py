@@ -119,6 +119,11 @@ def shell_command(*words: str | Path) -> str:
     return shlex.join(map(str, words))
 
 
+def open_recording(place: Path) -> str:
+    """Say how the recording in a folder is opened."""
+    return f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}"
+
+
 def say_written(folder: RunFolder, place: Path, open_it: str, as_json: bool) -> None:
     """Write the path of the files and how to open them; with JSON only if the path is not the expected one."""
     if not as_json or place != folder.path:

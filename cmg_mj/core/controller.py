@@ -122,7 +122,7 @@ class Controller:
         observers = [observer, *self.open_loop_observers.values()]
         self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
-        self._law = LawRunner(law, self._single, len(self.extra_signals[0]))
+        self._law = LawRunner(law, self._single)
         self.reset()
 
     @property
@@ -180,8 +180,7 @@ class Controller:
 
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""
-        accelerometers, encoders, fog = self._sampled
-        u = self.decide(step, accelerometers.read(step), encoders.read(step), fog.read(step), self._true_rate).u
+        u = self.decide(step, *self.readings(step), self._true_rate).u
         if self.turns_gimbals:
             self.command_rate(u)
 

@@ -52,6 +52,11 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(parts)
 
 
+def counted(n: int, noun: str) -> str:
+    """Put a number before a noun: `1 world`, `2 worlds`."""
+    return f"{n:,} {noun}{'' if n == 1 else 's'}"
+
+
 def raised(error: BaseException) -> str:
     """Describe what a user's code raised, `ValueError: too large`, shortened, even if its own message raises."""
     text = shortened(_safely(lambda: str(error), "its message cannot be shown"), MAX_RAISED)

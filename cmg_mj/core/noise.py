@@ -91,13 +91,17 @@ class FlickerNoise:
         floor: Of the Allan deviation, in the reading's unit.
         dt: Sample period [s].
         normals: Standard normals that it starts from, a row a corner, (len(CORNERS_HZ), ...).
+
+    Attributes:
+        decay: Share of each corner's process that is left after a sample, a row a corner.
+        spread: Standard deviation of what it gains in a sample, likewise, in the reading's unit.
     """
 
     def __init__(self, floor: float, dt: float, normals: np.ndarray) -> None:
         sigma = spread_of(floor)
         decay = np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
-        self._decay = decay.reshape(-1, *[1] * (normals.ndim - 1))
-        self._spread = sigma * np.sqrt(1.0 - self._decay**2)
+        self.decay = decay.reshape(-1, *[1] * (normals.ndim - 1))
+        self.spread = sigma * np.sqrt(1.0 - self.decay**2)
         self._wander = sigma * normals
 
     def advance(self, normals: np.ndarray) -> np.ndarray:
@@ -109,8 +113,8 @@ class FlickerNoise:
         Returns:
             (n, ...), in the reading's unit.
         """
-        driven = self._spread * normals
+        driven = self.spread * normals
         for row in driven:
-            row += self._decay * self._wander
+            row += self.decay * self._wander
             self._wander = row
         return driven.sum(axis=1)

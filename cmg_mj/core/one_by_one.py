@@ -1,63 +1,27 @@
-"""Lets an observer or a law that takes floats alone serve many worlds: a copy of it steps each world by itself."""
+"""Lets an observer or a law of the user's, written for floats, serve many worlds: a copy of it steps each by itself."""
 
 from __future__ import annotations
 
 import copy
-import functools
 import logging
 import math
-from contextlib import suppress
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.types import Measurement, feedback_state
-
-WORLDS, SAMPLES = 3, 100
-"""Worlds and samples of the trial that shows whether an observer or a law takes arrays."""
+from cmg_mj.core.types import Measurement
 
 
-def for_worlds(part: Any, signals: int | None = None) -> Any:
-    """Return what steps many worlds as a user's observer or law steps one: itself where it takes arrays.
+def for_worlds(part: Any) -> Any:
+    """Return what steps many worlds as an observer or a law steps one.
 
-    Args:
-        part: The observer or the law.
-        signals: The number of the observer's extra signals, which a law is given; None for an observer.
-
-    Returns:
-        The part, or a `OneByOne` of it.
+    The package's own take arrays. So does a class that says `elementwise = True`, and a law whose `arrays` name
+    parameters that differ between worlds.
     """
-    if type(part).__module__.startswith("cmg_mj.") or getattr(part, "arrays", ()):
-        return part
-    apart = OneByOne(part)
-    with np.errstate(all="ignore"), suppress(Exception):  # of a user's code
-        alone = _tried(apart, signals)
-        with suppress(Exception):
-            if np.allclose(_tried(copy.deepcopy(part), signals), alone, rtol=1e-6, equal_nan=True):
-                return part
-        _say(type(part).__name__)
-    return apart
-
-
-@functools.cache
-def _say(name: str) -> None:
-    """Say once that a class takes no arrays."""
-    logging.getLogger("cmg_mj").warning(
-        "%s takes no arrays: many worlds run one by one. To run them together see docs/python.md", name
-    )
-
-
-def _tried(part: Any, signals: int | None) -> np.ndarray:
-    """Return estimates or commands of a trial on noise that grows, (SAMPLES, n_signals, WORLDS)."""
-    noise = np.random.default_rng(0).standard_normal((SAMPLES, 7 + (signals or 0), WORLDS))
-    noise *= np.linspace(0.0, 0.5, SAMPLES)[:, None, None]
-    state, results = part.init(Measurement(*noise[0, :3])), []
-    for sample in noise:
-        fed = [] if signals is None else [feedback_state(sample[4], sample[5], sample[6], tuple(sample[7:]))]
-        state, result = part.step(state, Measurement(*sample[:3]), *fed, sample[3])
-        results.append([np.reshape(number, WORLDS) for number in (result if signals is None else [result])])
-    return np.array(results)
+    elementwise = type(part).__module__.startswith("cmg_mj.") or getattr(part, "arrays", ())
+    return part if elementwise or getattr(part, "elementwise", False) else OneByOne(part)
 
 
 class States(list):
@@ -85,31 +49,39 @@ class OneByOne:
 
     def __init__(self, part: Any) -> None:
         self.stands_for = part
-        self._copies: list[Any] = []
+        self._copies: dict[int, Any] = {}
         self._result: Any = None
 
     def init(self, y: Measurement) -> States:
         """Return the state of each world at the first sample."""
-        self._copies = [copy.deepcopy(self.stands_for) for _ in y.y1]
-        return States(part.init(_of(y, world)) for world, part in enumerate(self._copies))
+        self._copies = {world: copy.deepcopy(self.stands_for) for world in range(np.size(y.y1))}
+        return States(part.init(_of(y, world)) for world, part in self._copies.items())
 
     def step(self, states: States, *inputs: Any) -> tuple[States, Any]:
-        """Advance every world by a sample.
+        """Advance every world by a sample; one that fails has NaN from then on, which ends it.
 
-        A world that has ended may bring NaN, which a user's code need not take: its results are NaN too.
+        Raises:
+            Exception: What the user's code raised before any world had a result, or in the last world.
         """
-        after, results = States(), []
-        for world, (part, state) in enumerate(zip(self._copies, states, strict=True)):
+        after, results = States(states), [self._result] * len(states)
+        for world, part in [*self._copies.items()]:
             given = [_of(value, world) for value in inputs]
             try:
-                state, self._result = part.step(state, *given)
-                results.append(self._result)
-            except Exception:
-                if self._result is None or np.isfinite([*given[0], *np.ravel(given[1])]).all():
+                after[world], result = part.step(states[world], *given)
+                shapes = {np.shape(number) for number in (result if isinstance(result, Sequence) else [result])}
+                if shapes != {()}:
+                    raise TypeError(f"step returned numbers of shapes {shapes}, not ()")
+                results[world], self._result = result, np.full(np.shape(result), math.nan)
+            except Exception as error:
+                running = math.isfinite(given[0].y1)  # one that has ended may bring NaN
+                if self._result is None or (running and len(self._copies) == 1):
                     raise
-                results.append(np.full(np.shape(self._result), math.nan))
-            after.append(state)
-        if np.ndim(results[0]) == 0:
+                del self._copies[world]
+                results[world] = self._result
+                if running:
+                    what = f"{type(self.stands_for).__name__} failed in one of {len(states)} worlds"
+                    logging.getLogger("cmg_mj").warning("%s: %s: %s", what, type(error).__name__, error)
+        if np.shape(self._result) == ():
             return after, np.array(results)
         return after, tuple(map(np.array, zip(*results, strict=True)))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -167,25 +167,22 @@ class ReducedModel:
         """Return the linearisation (6) with the measured outputs, for python-control."""
         import control
 
-        return control.StateSpace(
-            self.A, self.B, self.C, np.zeros((2, 1)), inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"]
-        )
+        return control.StateSpace(self.A, self.B, self.C, np.zeros((2, 1)), **_SIGNALS)
 
     def nonlinear_system(self) -> control.NonlinearIOSystem:
         """Return the reduced model (4) itself, for python-control."""
         import control
 
-        def update(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
-            return np.array([x[1], self.tilt_acceleration(x[0], x[1], x[2], u[0]), u[0]])
-
-        def output(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
-            return np.array([x[0], x[2]])
-
         return control.nlsys(
-            update, output, inputs=["u"], outputs=["y1", "y2"], states=["x1", "x2", "x3"], name="reduced_cmg"
+            lambda t, x, u, params: np.array([x[1], self.tilt_acceleration(x[0], x[1], x[2], u[0]), u[0]]),
+            lambda t, x, u, params: self.C @ x,
+            **_SIGNALS,
+            name="reduced_cmg",
         )
 
 
+_SIGNALS: dict[str, Any] = {"inputs": ["u"], "outputs": ["y1", "y2"], "states": ["x1", "x2", "x3"]}
+"""Names of python-control's signals."""
 Coefficients = tuple[list[float], list[float]]
 
 

@@ -109,14 +109,13 @@ class LawRunner:
     Args:
         law: The law.
         single: Whether on floats (one world) or on arrays (n_worlds,).
-        signals: The number of the observer's extra signals.
 
     Attributes:
         state: The law's memory; stages on the memory may replace it.
     """
 
-    def __init__(self, law: Law, single: bool, signals: int = 0) -> None:
-        self.law = law if single else for_worlds(law, signals)
+    def __init__(self, law: Law, single: bool) -> None:
+        self.law = law if single else for_worlds(law)
         self.state: State = None
         self._step = self.law.step
         self._least, self._most = -law.rate_limit, law.rate_limit

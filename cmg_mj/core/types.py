@@ -94,6 +94,7 @@ TORQUE = "torque_n_m"
 """The extra signal of an observer that estimates a tilting torque on the whole rig [N m]."""
 
 STATE_SIGNALS = ("x1_rad", "x2_rad_s", "x3_rad")
+"""The state's signals, which every observer estimates; those that it estimates beyond x come after them."""
 
 
 def needs(observer: Observer | type) -> tuple[str, ...]:

@@ -22,11 +22,16 @@ def override(fields: dict[str, TomlValue], setting: str) -> None:
     parts = name.strip().split(".")
     if not equals or not all(parts):
         raise InputError(f"--set {setting!r}: write section.field=value, for example plant.equilibrium_bias_deg=1.0")
+    assign(fields, name.strip(), value_of(text), f"--set {setting!r}")
+
+
+def value_of(text: str) -> Any:
+    """Read a value as TOML has it; a bare word is a string."""
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
     except (ValueError, RecursionError):  # TOMLDecodeError is a ValueError
-        value = text.strip()  # a bare word is a string
-    assign(fields, name.strip(), value, f"--set {setting!r}")
+        return text.strip()
+    return value
 
 
 def assign(fields: dict[str, TomlValue], name: str, value: TomlValue, setting: str) -> None:

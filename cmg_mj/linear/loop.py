@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shortened
 from cmg_mj.core.sensor import steps_until
-from cmg_mj.core.types import extra_signals
+from cmg_mj.core.types import STATE_SIGNALS, extra_signals
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant
@@ -32,7 +32,7 @@ INPUTS = (
     "gimbal_rate_noise_rad_s",
 )
 """Inputs of the system: a torque on the rig, noise of the four measurements, a gimbal rate that nobody commanded."""
-OUTPUTS = ("x1_rad", "x2_rad_s", "x3_rad", "u_rad_s")
+OUTPUTS = (*STATE_SIGNALS, "u_rad_s")
 """Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
@@ -148,7 +148,7 @@ class ClosedLoop:
         except InputError as error:
             takes = f"linear_closed_loop takes state_feedback with {', '.join(TAKES)}, or one of your own"
             raise InputError(f"{field}: {error}; {takes}") from error
-        self._estimates = [] if true_state else [f"estimated_{name}" for name in (*OUTPUTS[:3], *extra)]
+        self._estimates = [] if true_state else [f"estimated_{name}" for name in (*STATE_SIGNALS, *extra)]
         self._channels = _channels(design, true_state)
         control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
         self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 from cmg_mj.core.reduced_model import ReducedModel
@@ -38,15 +38,10 @@ class Scales(NamedTuple):
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a parameter, s^time (kg m^2)^inertia.
-
-    A parameter `of_rig` describes the rig's motion and goes with the rig's units. Others describe errors of the
-    sensors, which are the same on a slow rig, or the surroundings: the pivot's motion, a gait, friction.
-    """
+    """The unit of a parameter, s^time (kg m^2)^inertia."""
 
     time: float = 0.0
     inertia: float = 0.0
-    of_rig: bool = True
 
     def factor(self, scales: Scales) -> float:
         """Return what a parameter of this unit is multiplied by."""
@@ -62,21 +57,12 @@ GAIN_1, GAIN_2 = Unit(-1), Unit(-2)
 TORQUE = Unit(-2, 1)
 """J x1''."""
 
+_L, _SIGMA = (GAIN_1, GAIN_2), Unit(-1)
+"""Of the adaptive observers: x' = A x + ... + L (C x - y); Sigma Gamma T^2 is the rate at which e is learnt, T = g/l2 a
+pure number."""
 _HOMOGENEOUS: dict[str, Units] = {
     "k1": GAIN_1,  # x1' = x2 - k1 [e]^alpha
     "k2": GAIN_2,  # x2' = f2 - k2 [e]^(2 alpha - 1)
-    "alpha": PURE,
-}
-_ADAPTIVE: dict[str, Units] = {
-    "L": (GAIN_1, GAIN_2),  # x' = A x + ... + L (C x - y)
-    "Gamma": (PURE, Unit(-4, 2), Unit(-4, 2)),  # rad^2, (N m)^2, (N m)^2
-    "Sigma": Unit(-1),  # Sigma Gamma T^2 is the rate at which e is learnt, T = g/l2 a pure number
-}
-_ACCELERATION: dict[str, Units] = {
-    "rate_start": Unit(-1, of_rig=False),  # about what remains of it: the sensors' noise
-    "bias_start": Unit(-2, of_rig=False),
-    "bias_walk": Unit(-2.5, of_rig=False),
-    "jerk": Unit(-2, of_rig=False),  # beside the acceleration's noise, which is as large or larger
 }
 
 UNITS: Mapping[str, Mapping[str, Units]] = {
@@ -85,12 +71,7 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
         "Q": (Unit(-2), Unit(-4), Unit(-2)),
         "H0": (Unit(-1), Unit(-3), Unit(-1)),
     },
-    "homogeneous": {
-        **_HOMOGENEOUS,
-        "friction_n_m": replace(TORQUE, of_rig=False),
-        "damping_n_m_s": Unit(-1, 1, of_rig=False),
-        "friction_width_rad_s": Unit(-1, of_rig=False),
-    },
+    "homogeneous": _HOMOGENEOUS,
     "luenberger": {  # x' = A x + B u + L (y - C x)
         "L": ((GAIN_1, GAIN_1), (GAIN_2, GAIN_2), (GAIN_1, GAIN_1)),
     },
@@ -101,32 +82,19 @@ UNITS: Mapping[str, Mapping[str, Units]] = {
         "rate_start": Unit(-1),
         "torque_start": TORQUE,
     },
-    "gyro_free": _ACCELERATION,
-    "free_pivot": {
-        **_ACCELERATION,
-        "pivot_hz": Unit(-1, of_rig=False),
-        "pivot_start": PURE,
-        "pivot_floor": PURE,
-        "pivot_s": Unit(1, of_rig=False),
-        "learn_s": Unit(1, of_rig=False),
-        "innovation_weight": PURE,
-        "noise_s": Unit(1, of_rig=False),
-        "rise_factor": PURE,
-        "covariance_boost": PURE,
-        "inflation": PURE,
-        "gate": PURE,
-    },
-    "finite_difference": {},
-    "super_twisting": {"L": Unit(-2), "l0": PURE, "l1": PURE},  # L bounds x1''
-    "linear_high_gain": {"epsilon": Unit(1), "a1": PURE, "a2": PURE},  # s^2 + (a1/epsilon) s + a2/epsilon^2
+    "super_twisting": {"L": Unit(-2)},  # bounds x1''
+    "linear_high_gain": {"epsilon": Unit(1)},  # s^2 + (a1/epsilon) s + a2/epsilon^2
     "high_gain": {  # x1' = x2 - L^(1+b) q1(s), s = l1 e/L^b, runs L times as fast; q1(s) in units of L^b
         "phi2": Unit(-1),  # L' = L (phi1 (phi2 - L) + phi3 Omega), L and Omega [1/s]
-        **dict.fromkeys(("l1", "l2", "d_inf", "b", "phi1", "phi3"), PURE),
     },
-    "adaptive": {**_ADAPTIVE, "sinusoid_hz": Unit(-1, of_rig=False), "known_bias_deg": PURE},
-    "homogeneous_adaptive": {**_HOMOGENEOUS, **_ADAPTIVE, "Gamma": PURE},
+    "adaptive": {"L": _L, "Gamma": (PURE, Unit(-4, 2), Unit(-4, 2)), "Sigma": _SIGMA},  # rad^2, (N m)^2, (N m)^2
+    "homogeneous_adaptive": {**_HOMOGENEOUS, "L": _L, "Sigma": _SIGMA},
 }
-"""Observer -> parameter -> its unit. A user's own observer has none here."""
+"""Observer -> parameter that describes the rig's motion -> its unit.
+
+All others stay: pure numbers, and what describes errors of the sensors, which are the same on a slow rig, or the
+surroundings: the pivot's motion, a gait, friction. `tests/observers/test_scaling.py` has their units.
+"""
 
 
 def scales_of(model: ReducedModel) -> Scales:
@@ -144,12 +112,6 @@ def scale_value(value: Number, unit: Units, scales: Scales) -> Number:
     return value * unit.factor(scales)
 
 
-def scaled_names(kind: str) -> tuple[str, ...]:
-    """Return the parameters of an observer that go with the rig; none of a user's own observer."""
-    units = UNITS.get(kind, {}).items()  # those in tuples are all of the rig
-    return tuple(name for name, its in units if isinstance(its, tuple) or (its.of_rig and its != PURE))
-
-
 def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:
     """Carry an observer's default parameters to a rig, as `gains = "scaled"` carries Table 2's gains.
 
@@ -158,7 +120,7 @@ def scaled_parameters(kind: str, model: ReducedModel) -> dict[str, Number]:
         model: The rig's reduced model.
 
     Returns:
-        Those that are not what they are on the papers' rig: `scaled_names`.
+        Those that are not what they are on the papers' rig; none of a user's own observer.
     """
     scales, defaults = scales_of(model), OBSERVER_CLASSES.takes(kind)
-    return {name: scale_value(defaults[name].default, UNITS[kind][name], scales) for name in scaled_names(kind)}
+    return {name: scale_value(defaults[name].default, its, scales) for name, its in UNITS.get(kind, {}).items()}

@@ -93,8 +93,14 @@ def known_interval(values: Sequence[float] | np.ndarray, positive: bool = False)
     return positive_mean_interval(known) if positive else mean_interval(known)
 
 
-def finite_values(values: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Discard what is not finite, as of worlds that fell, (n,) -> (n_finite,)."""
+def known_ends(values: Sequence[float] | np.ndarray, positive: bool = False) -> list[float] | None:
+    """Return the ends of `known_interval`; None of too few values."""
+    interval = known_interval(values, positive)
+    return None if interval is None else [interval.low, interval.high]
+
+
+def finite_values(values: Sequence[float | None] | np.ndarray) -> np.ndarray:
+    """Discard what is None or not finite, as of worlds that fell, (n,) -> (n_finite,)."""
     sample = np.asarray(values, dtype=float)
     return sample[np.isfinite(sample)]
 

@@ -81,6 +81,11 @@ class Result(NamedColumns):
         """True for each world that fell, (n_worlds,)."""
         return np.array([outcome.fell for outcome in self.outcomes])
 
+    @property
+    def interrupted(self) -> bool:
+        """True if the user interrupted the run."""
+        return any(outcome.kind == "interrupted" for outcome in self.outcomes)
+
     def values(self, key: str, estimator: str | None = None) -> np.ndarray:
         """Return one number of every world's summary.
 
@@ -189,8 +194,6 @@ class Result(NamedColumns):
             raise InputError(
                 f"split({count}): {worlds} worlds do not make {count} equal groups. Give a divisor of {worlds}"
             )
-        if count == 1:
-            return [self]
         size = worlds // count
         return [self.select(slice(i * size, (i + 1) * size)) for i in range(count)]
 

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from cmg_mj.core.errors import InputError, nearest
+from cmg_mj.core.types import STATE_SIGNALS
 from cmg_mj.results.folder import METADATA_KEY, write_parquet
 
 if TYPE_CHECKING:
@@ -19,9 +20,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SIGNALS = (
-    "x1_rad",
-    "x2_rad_s",
-    "x3_rad",
+    *STATE_SIGNALS,
     "y1_rad",
     "y2_rad",
     "acceleration_rad_s2",
@@ -31,9 +30,6 @@ SIGNALS = (
     "push_n_m",
 )
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
-
-ESTIMATES = ("x1_rad", "x2_rad_s", "x3_rad")
-"""Signals that every observer estimates; those that it estimates beyond x come after them."""
 
 POSITIONS = {
     "hinge": ("angle/{}_rad",),
@@ -95,7 +91,7 @@ class Layout:
         estimates = [
             f"estimate/{observer}/{name}"
             for observer, more in zip(self.observers, self.extra_signals, strict=True)
-            for name in (*ESTIMATES, *more)
+            for name in (*STATE_SIGNALS, *more)
         ]
         return [*SIGNALS, *estimates]
 

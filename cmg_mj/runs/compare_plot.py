@@ -10,13 +10,11 @@ import numpy as np
 from cmg_mj.results.intervals import known_interval
 from cmg_mj.results.summary_keys import KEYS
 from cmg_mj.runs.comparison import ComparedObserver, comparison_rows
-from cmg_mj.view.plots.figure import pyplot, save_figure
+from cmg_mj.view.plots.figure import pyplot, save_figure, scale_of
 from cmg_mj.view.plots.style import colours, hexadecimal, short_names
 
 COLUMNS = 3
 """Panels in a row."""
-LOGARITHMIC = 10.0
-"""Positive figures that differ by more than this factor are drawn on a logarithmic axis."""
 
 
 def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) -> None:
@@ -40,9 +38,7 @@ def plot_worlds(path: Path, compared: Sequence[ComparedObserver], title: str) ->
     palette = [hexadecimal(colour) for colour in colours(row.name for row in rows).values()]
     stood = [row.entry.result.stood for row in rows]
     for axes, (key, worlds) in zip(grid.flat, drawn.items(), strict=False):
-        known = np.concatenate(worlds)
-        if np.nanmin(known) > 0.0 and np.nanmax(known) > LOGARITHMIC * np.nanmin(known):
-            axes.set_xscale("log")
+        axes.set_xscale(scale_of(np.concatenate(worlds)))
         axes.set_title(KEYS[key].heading, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, axis="x")
         for place, (values, upright, color) in enumerate(zip(worlds, stood, palette, strict=True)):

@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.core.types import BIAS, extra_signals
 from cmg_mj.plant.plant import Plant, load_scenario_plant
 from cmg_mj.results.baselines import BASELINES
-from cmg_mj.results.intervals import finite_mean, finite_values, known_interval
+from cmg_mj.results.intervals import finite_mean, finite_values, known_ends
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import KEYS, NESTED, Summary, as_table, finite, section
 from cmg_mj.runs.experiment import Experiment, prepare
@@ -64,15 +64,8 @@ class ComparedObserver:
                 "stopped_fraction": len(self.stopped) / worlds,
                 "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
                 **{key: result.mean(key) for key in result.summaries[0] if key not in NESTED},
-                "velocity_rms_error_std_rad_s": standard_deviation(result.values("velocity_rms_error_rad_s")),
             }
         )
-
-
-def standard_deviation(values: np.ndarray) -> float | None:
-    """Compute the standard deviation over the worlds that have a figure, (n_worlds,); None of fewer than two."""
-    known = finite_values(values)
-    return float(known.std(ddof=1)) if len(known) > 1 else None
 
 
 def prepare_comparison(scenario: Scenario, observers: Sequence[str]) -> list[Experiment]:
@@ -125,10 +118,10 @@ def compare(
         result = experiment.run_many(
             worlds, keep_trajectory=False, on_progress=partial(report, i, experiment.scenario.duration_s)
         )
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        if result.interrupted:
             break
         world_0 = experiment.run(on_progress=partial(report, i + 1, math.inf))
-        if world_0.outcomes[0].kind == "interrupted":
+        if world_0.interrupted:
             break
         compared.append(ComparedObserver(experiment, result, world_0))
     return compared
@@ -197,7 +190,6 @@ class ComparisonRow:
             "in_loop_of": self.entry.kind,
             **{key: loop[key] for key in ("seed", "differs", "worlds")},
             **{key: finite_mean(self.values(key)) for key in loop if key in KEYS},
-            "velocity_rms_error_std_rad_s": standard_deviation(self.values(ERROR)),
         }
 
 
@@ -237,13 +229,13 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
     leaders = {key: ComparisonRow(observer) for key, observer in best.items() if observer}
     standing = []
     for row in comparison_rows(compared):
-        intervals = {key: _ends(row.values(key), KEYS[key].positive) for key in keys}
+        intervals = {key: known_ends(row.values(key), KEYS[key].positive) for key in keys}
         minus_best = {}
         for key, leader in leaders.items():
             if row != leader:
                 less = row.values(key) - leader.values(key)  # world by world
                 mean, worlds = finite_mean(less), len(finite_values(less))
-                minus_best[key] = {"best": leader.name, "worlds": worlds, "mean": mean, "interval": _ends(less)}
+                minus_best[key] = {"best": leader.name, "worlds": worlds, "mean": mean, "interval": known_ends(less)}
         standing.append(finite(row.summary | {"intervals": intervals, "minus_best": minus_best}))
     return standing
 
@@ -251,8 +243,3 @@ def standings(compared: Sequence[ComparedObserver]) -> list[Summary]:
 def worlds_table(compared: Sequence[ComparedObserver]) -> pa.Table:
     """Make a table of every world of every row of a comparison, as `Result.table` does."""
     return as_table(world for row in comparison_rows(compared) for world in row.entry.result.rows(row.reference))
-
-
-def _ends(values: np.ndarray, positive: bool = False) -> list[float] | None:
-    interval = known_interval(values, positive)
-    return None if interval is None else [interval.low, interval.high]

@@ -8,9 +8,9 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.one_by_one import for_worlds
-from cmg_mj.core.types import extra_signals
+from cmg_mj.core.types import STATE_SIGNALS, extra_signals
 from cmg_mj.observers import Estimate, Measurement, Observer
-from cmg_mj.results.trajectory import ESTIMATES, Trajectory
+from cmg_mj.results.trajectory import Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
@@ -28,7 +28,7 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
         (n_ticks, n_worlds); NaN after a world's end.
     """
     signals = replay_all(observer, trajectory)
-    return Estimate(*(signals[name] for name in ESTIMATES))
+    return Estimate(*(signals[name] for name in STATE_SIGNALS))
 
 
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
@@ -38,7 +38,7 @@ def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarr
     acceleration = np.full_like(y1, np.nan) if measured is None else measured
     measurements = map(Measurement, *map(_rows, (y1, trajectory["y2_rad"], acceleration)))
     first = next(measurements)
-    columns = {name: np.empty(y1.shape) for name in (*ESTIMATES, *extra_signals(observer))}
+    columns = {name: np.empty(y1.shape) for name in (*STATE_SIGNALS, *extra_signals(observer))}
     for column in columns.values():
         column[0] = 0.0 * first.y1
     columns["x1_rad"][0], columns["x3_rad"][0] = first.y1, first.y2

@@ -181,13 +181,16 @@ class Fog:
         """Standard deviation of one sample [rad/s]."""
         return radians(self.angle_random_walk_deg_rth) / 60.0 * math.sqrt(self.rate_hz)
 
+    @property
+    def step_share(self) -> float:
+        """Share of a step that the low-pass has taken after one sample period."""
+        return 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
+
     def at_work(self, site: Site) -> SampledSensor:
         """Start the gyro: its low-pass, noise, offset and range."""
         noise, sigma = site.noise(NoiseStream.FOG, 1), self.white_noise_sigma
         bias, limit = math.radians(self.bias_deg_h) / 3600.0, math.radians(self.range_deg_s)
-        # The share of a step that a first-order low-pass has taken after one sample period.
-        share = 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
-        passed: Scalar = None
+        share, passed = self.step_share, None
 
         def show(rate: Scalar, ideal: IdealReading) -> Scalar:
             nonlocal passed

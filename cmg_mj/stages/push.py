@@ -42,6 +42,12 @@ class Push(Section):
         """When it ends [s]."""
         return self.start_s + self.duration_s
 
+    @property
+    def words(self) -> str:
+        """The push in words."""
+        about = f" about {self.axis}" if self.axis else ""
+        return f"{self.torque_n_m:g} N m{about} from {self.start_s:g} s to {self.end_s:g} s"
+
 
 class Pushes(Disturbance):
     """The torques of pushes. A push about an axis that the rig does not have, since it is locked, moves nothing.

@@ -33,6 +33,13 @@ class Swing(Section):
     duration_s: Duration | None = None
     axis: str | None = None
 
+    @property
+    def words(self) -> str:
+        """The swing in words."""
+        about = f" about {self.axis}" if self.axis else ""
+        end = "the end" if self.duration_s is None else f"{self.start_s + self.duration_s:g} s"
+        return f"{self.amplitude_n_m:g} N m{about} at {self.frequency_hz:g} Hz from {self.start_s:g} s to {end}"
+
     def torque(self, time: float) -> float:
         """At a time [N m]."""
         since = time - self.start_s

@@ -32,7 +32,7 @@ from cmg_mj.features.tuning import Recorded, halves, recorder, tune
 from cmg_mj.features.tuning.search import StopSearch
 from cmg_mj.features.tuning.simulations import window_of
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.observers.scaling import scaled_names, scaled_parameters, scales_of
+from cmg_mj.observers.scaling import scaled_parameters, scales_of
 from cmg_mj.results.floors import FLOOR_Y1, TiltFloor, acceleration_floor
 from cmg_mj.results.summary_keys import SummaryValue, section
 from cmg_mj.results.tables import markdown_table
@@ -133,7 +133,7 @@ def margins(experiment: Experiment, kind: str, ceiling: float) -> dict:
     models = {"papers": {}, "scaled": scaled_parameters(kind, experiment.plant.reduced)}
     row = {}
     for name, parameters in models.items():
-        if name == "papers" or scaled_names(kind):
+        if name == "papers" or parameters:
             loop = prepare(with_parameters(experiment.scenario, kind, parameters), experiment.plant)
             row[name] = push_margin(loop.design).median_impulse / ceiling
     return row

@@ -11,7 +11,6 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 from cmg_mj import Estimate, Experiment, FeedbackState, InputError, Measurement
-from cmg_mj.core import one_by_one
 from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.inputs.types import STRICT, Positive
 from cmg_mj.runs.open_loop import replay
@@ -273,29 +272,42 @@ class LawWithAnIf(MyLaw):
         (LawWithAnIf, ["observer.kind=adaptive", "controller.bias_trim_s=0.1"]),
     ],
 )
-def test_worlds_of_a_part_that_takes_floats_alone_are_its_single_runs(
-    part: type, settings: list[str], caplog: pytest.LogCaptureFixture
-) -> None:
-    """Side by side with another observer and in a replay of many worlds too. It is said once."""
+def test_worlds_of_a_part_that_takes_floats_alone_are_its_single_runs(part: type, settings: list[str]) -> None:
+    """Side by side with another observer and in a replay of many worlds too."""
     experiment = with_part(part, *settings)
-    one_by_one._say.cache_clear()
     other = push_recovery("push=[]", "duration_s=0.3")
     alone, *_ = run_jobs([run_of(experiment, 3), run_of(other, 2)])
     for many in (alone, experiment.run_many(3)):
         assert {outcome.kind for outcome in many.outcomes} == {"done"}
         for world in (0, 2):
             assert_same_bits(recorded(many).world(world), recorded(experiment.run(world=world)))
-    assert [record.message.split()[0] for record in caplog.records] == [part.__name__]
     if field_of(part) == "observer.kind":
-        rate = replay(experiment.design.observer(), many.trajectory).x2
-        np.testing.assert_array_equal(rate, many.trajectory[f"estimate/{experiment.observer_title}/x2_rad_s"])
+        rate = replay(experiment.design.observer(), recorded(many)).x2
+        np.testing.assert_array_equal(rate, recorded(many)[f"estimate/{experiment.observer_title}/x2_rad_s"])
 
 
-def test_a_part_that_takes_arrays_is_stepped_with_arrays() -> None:
-    part = Mine(0.005, None)
-    assert for_worlds(part) is part
-    law = MyLaw(0.005, 4.7)
-    assert for_worlds(law, 2) is law
+def test_a_class_that_says_so_is_stepped_with_arrays() -> None:
+    for part in (Mine(0.005, None), MyLaw(0.005, 4.7)):
+        assert for_worlds(part) is not part
+        part.elementwise = True  # type: ignore[union-attr]
+        assert for_worlds(part) is part
+
+
+class FailsWhereItIsFar(Mine):
+    def step(self, state: Any, y: Measurement, u: Any) -> Any:
+        if y.y1 > math.radians(3.0):
+            raise ValueError("too far")
+        return super().step(state, y, u)
+
+
+def test_a_world_in_which_a_part_fails_ends_alone(caplog: pytest.LogCaptureFixture) -> None:
+    """Which it is does not depend on the others."""
+    experiment = with_part(FailsWhereItIsFar, "sensors.accelerometer.noise_density_ug_rthz=1000")
+    many = experiment.run_many(8)
+    fails = [experiment.run(world=world).outcomes[0].kind == "stopped" for world in range(8)]
+    assert 0 < sum(fails) < 8
+    assert [outcome.kind == "stopped" for outcome in many.outcomes] == fails
+    assert "FailsWhereItIsFar failed in one of 8 worlds: ValueError: too far" in caplog.text
 
 
 def test_no_law_gets_beyond_the_limit() -> None:

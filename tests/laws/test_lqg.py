@@ -137,27 +137,6 @@ def test_the_closed_loops_poles_are_the_regulators_and_the_filters(dt: float, pa
     assert np.sort(np.abs(joint_poles))[-2] < 1.0 - 1e-4
 
 
-@pytest.mark.slow
-def test_the_error_is_what_the_filter_says() -> None:
-    """Its covariance over worlds on the linear rig with all its noises, in units of the standard deviations."""
-    control_law, worlds, rng, errors = law(), 3000, np.random.default_rng(5), []
-    P, _, Q = estimator(control_law.dt, *noises(control_law))
-    F, G = discretise(*rig(), control_law.dt)
-    root = np.linalg.cholesky(Q + 1e-24 * np.eye(4))
-    x = np.zeros((4, worlds))
-    state, u = control_law.init(Measurement(x[0], x[2])), np.zeros(worlds)
-    for k in range(round(16.0 / control_law.dt)):
-        if k * control_law.dt >= 12.0 and k % 100 == 0:  # the filter's slowest pole is at -0.37 1/s
-            errors.append((x - np.array(state[:4])).T)
-        y = Measurement(x[0] + NOISE.tilt * rng.normal(size=worlds), x[2] + NOISE.gimbal * rng.normal(size=worlds))
-        state, u = control_law.step(state, y, feedback_state(0.0, 0.0, 0.0), u)
-        x = F @ x + G * u + root @ rng.normal(size=(4, worlds))
-    sigma = np.sqrt(np.diag(P))
-    scaled = np.concatenate(errors) / sigma
-    np.testing.assert_allclose(scaled.T @ scaled / len(scaled), P / np.outer(sigma, sigma), atol=0.04)
-    assert np.abs(scaled.mean(axis=0)).max() < 0.04
-
-
 def test_its_noises_are_those_of_the_observer_kalman() -> None:
     """As docs/assumptions.md has them."""
     assert noises(law()) == (0.03, 0.082, 0.024)

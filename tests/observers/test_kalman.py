@@ -172,8 +172,8 @@ def test_a_bias_is_found_as_a_torque() -> None:
 )
 def test_the_noise_of_y2_is_that_of_a_run(scenario: str, settings: list[str]) -> None:
     """Both encoders of a pair round alike, so that y2 is no better than one of them."""
-    experiment = prepare(load_scenario(scenario, settings, "kalman"))
+    experiment = prepare(load_scenario(scenario, ["duration_s=3", *settings], "kalman"))
     observer: Any = experiment.design.observer()
-    seen = experiment.run_many(4).trajectory
+    seen = experiment.run_many(16).trajectory
     assert seen is not None
     assert (seen["y2_rad"] - seen["x3_rad"]).std() == pytest.approx(observer.noise.gimbal, rel=0.03)

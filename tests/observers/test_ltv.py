@@ -9,8 +9,6 @@ import pytest
 from scipy.linalg import expm
 
 from tests.observers.reference import HEAVY, PAPER, integrate, ltv_slope, observer, rough_signals, run
-from tests.recorded import push_recovery, recorded
-from tests.tiers import slow_but
 
 C = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -26,37 +24,14 @@ def relative_errors(package_step: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(package_step[..., mask] / reference[..., mask] - 1.0).max())
 
 
-@pytest.mark.parametrize("duration_s", slow_but([1.0, 4.0], 1.0))
-def test_in_a_closed_loop_it_is_the_reference_integration(duration_s: float) -> None:
-    """With sensor noise and a push in the middle, from the record alone: there is no other memory."""
-    trajectory = recorded(
-        push_recovery(f"duration_s={duration_s}", f"push.0.start_s={duration_s / 2.0}", observer="ltv").run()
-    )
-    y1, y2, u = (trajectory[name] for name in ("y1_rad", "y2_rad", "u_rad_s"))
-    reference = integrate(ltv_slope(), np.concatenate([[y1[0], 0.0, y2[0]], np.eye(3).ravel()]), y1, y2, u)
-    estimates, states = run(observer("ltv"), y1, y2, u)
-    H, expected = np.array([riccati_matrix(state) for state in states[1:]]), reference[:, 3:].reshape(-1, 3, 3)
-    assert relative_errors(H, expected) < 1e-6
-    assert np.abs(expected[:, [0, 1, 2, 2], [2, 2, 0, 1]]).max() < 1e-9  # the third state decouples
-    assert np.linalg.eigvalsh(H).min() > 0.5
-    np.testing.assert_array_less(np.abs(estimates - reference[:, :3]).max(axis=0), [2e-6, 5e-5, 1e-12])
-    recorded_estimates = [trajectory[f"estimate/ltv/{name}"][1:] for name in ("x1_rad", "x2_rad_s", "x3_rad")]
-    np.testing.assert_allclose(recorded_estimates, estimates.T, rtol=0.0, atol=1e-9)
-
-
 CASES = [
     pytest.param({}, PAPER, id="Table 2"),
-    pytest.param({"Q": (300.0, 5e6, 1.0)}, PAPER, id="Q1"),
-    pytest.param({"Q": (1.0, 2e4, 1.0)}, PAPER, id="Q2"),
-    pytest.param({"Q": (1.0, 5e6, 900.0)}, PAPER, id="Q3"),
-    pytest.param({"H0": (40.0, 1.0, 1.0)}, PAPER, id="H0 1"),
-    pytest.param({"H0": (1.0, 3e4, 1.0)}, PAPER, id="H0 2"),
-    pytest.param({"H0": (1.0, 1.0, 0.1)}, PAPER, id="H0 3"),
+    pytest.param({"Q": (300.0, 2e4, 900.0)}, PAPER, id="Q"),
+    pytest.param({"H0": (40.0, 3e4, 0.1)}, PAPER, id="H0"),
     pytest.param({"Q": (1.0, 100.0, 1.0)}, HEAVY, id="another rig"),
 ]
 
 
-@pytest.mark.daily_cases("Table 2", "another rig", "Q2")
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_follows_the_continuous_observer(parameters: dict, model) -> None:
     y1, y2, u = rough_signals(100)
@@ -71,16 +46,13 @@ def test_follows_the_continuous_observer(parameters: dict, model) -> None:
 
 EXTREMES = [
     pytest.param(dt, (q1, q2, q3), steps, id=f"{dt:g} s, Q = {q1:g}, {q2:g}, {q3:g}")
-    for dt in (0.001, 0.005, 0.05)
+    for dt in (0.001, 0.05)
     for q1, q2, q3, steps in (
-        (1.0, 5e6, 1.0, 200),
-        (1e-3, 1e-3, 1e-3, 200),
+        (1.0, 5e6, 1.0, 100),
         (1e-3, 1e12, 1e6, 25),
         (1e6, 1e-3, 1.0, 25),
-        (1e6, 1e6, 1e6, 25),
-        (1e6, 1e12, 1e-3, 25),
     )
-] + [pytest.param(0.001, (1e12, q2, 1.0), 3, id=f"0.001 s, Q = 1e+12, {q2:g}, 1") for q2 in (1e-3, 1e12)]
+] + [pytest.param(0.001, (1e12, 1e12, 1.0), 3, id="0.001 s, Q = 1e+12, 1e+12, 1")]
 
 
 @pytest.mark.parametrize(("dt", "weights", "steps"), EXTREMES)

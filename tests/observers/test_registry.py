@@ -6,10 +6,10 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Estimate, Measurement, make_observer
+from cmg_mj.observers import Estimate, Measurement
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import parse_scenario
-from tests.observers.reference import DT, NOISE, PAPER, observer
+from tests.observers.reference import observer
 from tests.recorded import recorded
 
 
@@ -35,13 +35,6 @@ class Open:
 
 
 USER_OBSERVER = f"{__name__}:Mine"
-
-
-@pytest.mark.parametrize("kind", sorted(OBSERVERS))
-def test_every_name_makes_its_observer(kind: str) -> None:
-    result = make_observer(kind, DT, PAPER, NOISE)
-    assert f"{type(result).__module__}:{type(result).__name__}" == OBSERVERS[kind]
-    assert OBSERVER_CLASSES.find(OBSERVERS[kind]) is type(result)
 
 
 def test_a_users_class_in_a_scenario() -> None:

@@ -18,6 +18,29 @@ from tests.observers.reference import DT, HEAVY, NOISE, rough_signals
 
 EXTRA = {"bias_rad": PURE}
 """Units of estimates beyond x; the others are torques."""
+_PIVOT_FREE = {"rate_start": Unit(-1), "bias_start": Unit(-2), "bias_walk": Unit(-2.5), "jerk": Unit(-2)}
+_TIMES = dict.fromkeys(("pivot_s", "learn_s", "noise_s"), Unit(1))
+STAY: dict[str, dict[str, Unit]] = {
+    "homogeneous": {
+        "alpha": PURE,
+        "friction_n_m": TORQUE,
+        "damping_n_m_s": Unit(-1, 1),
+        "friction_width_rad_s": Unit(-1),
+    },
+    "gyro_free": _PIVOT_FREE,
+    "free_pivot": {
+        **_PIVOT_FREE,
+        **_TIMES,
+        "pivot_hz": Unit(-1),
+        **dict.fromkeys(("pivot_start", "pivot_floor", "innovation_weight", "rise_factor", "covariance_boost", "inflation", "gate"), PURE),
+    },
+    "super_twisting": {"l0": PURE, "l1": PURE},
+    "linear_high_gain": {"a1": PURE, "a2": PURE},
+    "high_gain": dict.fromkeys(("l1", "l2", "d_inf", "b", "phi1", "phi3"), PURE),
+    "adaptive": {"sinusoid_hz": Unit(-1), "known_bias_deg": PURE},
+    "homogeneous_adaptive": {"alpha": PURE, "Gamma": PURE},
+}
+"""Units of the parameters that are not scaled: of the sensors, of the surroundings, and pure numbers."""
 SLOW_AND_HEAVY = Scales(time=2.7, inertia=900.0)
 OTHER: dict[str, dict[str, Any]] = {
     "homogeneous": {"friction_n_m": 0.02, "damping_n_m_s": 0.01},
@@ -43,7 +66,7 @@ def other_rig(model: ReducedModel, s: Scales) -> ReducedModel:
 
 def of_all(kind: str, values: dict[str, Any], scales: Scales) -> dict[str, Any]:
     """Every parameter in the other rig's units, whatever it describes."""
-    units = UNITS[kind]
+    units = {**UNITS.get(kind, {}), **STAY.get(kind, {})}
     return {name: scale_value(value, units[name], scales) if name in units else value for name, value in values.items()}
 
 
@@ -82,7 +105,9 @@ def test_the_same_in_the_rigs_own_units(kind: str) -> None:
 def test_every_number_has_a_unit(kind: str) -> None:
     parameters = OBSERVER_CLASSES.takes(kind).values()
     numbers = {p.name for p in parameters if p.name not in OBSERVER_CLASSES.bench_parameters}
-    assert set(UNITS[kind]) == numbers - {"bias", "torque"}
+    scaled, stay = UNITS.get(kind, {}).keys(), STAY.get(kind, {}).keys()
+    assert scaled | stay == numbers - {"bias", "torque"}
+    assert not scaled & stay
 
 
 def test_the_scale_of_time_is_that_of_the_law() -> None:
@@ -93,4 +118,3 @@ def test_the_scale_of_time_is_that_of_the_law() -> None:
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
     for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.features.tuning.user_observer:UserObserver"):
         assert scaled_parameters(kind, HEAVY) == {}
-    assert not any(unit.of_rig for unit in UNITS["gyro_free"].values() if isinstance(unit, Unit))

@@ -128,11 +128,6 @@ def test_plant_comes_to_its_equilibrium_and_stays_in_its_set() -> None:
     assert run_plant([1], 0.05).y[:, 0] != pytest.approx(run.y[:, 0])
 
 
-def test_noise_has_the_papers_standard_deviation() -> None:
-    run = run_plant([4, 5], [0.05, 0.1])
-    assert (run.y - run.eta[0]).std(axis=0) == pytest.approx([0.05, 0.1], rel=0.05)
-
-
 # --- the bounds ---------------------------------------------------------------------------------------------
 
 

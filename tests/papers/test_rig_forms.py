@@ -80,11 +80,6 @@ def test_adaptive_equals_friedland_tacker(mode: str, model: ReducedModel) -> Non
     assert largest_error < 1e-12
 
 
-def test_adaptive_equals_friedland_tacker_with_the_default_gains() -> None:
-    for estimate, expected in estimates(adaptive(), 2):
-        np.testing.assert_allclose(estimate, expected, rtol=0.0, atol=1e-12)
-
-
 @pytest.mark.parametrize(("parameters", "model"), CASES)
 def test_high_gain_equals_updated_high_gain(parameters: dict, model: ReducedModel) -> None:
     k = DEFAULTS | parameters

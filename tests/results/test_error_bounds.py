@@ -18,29 +18,6 @@ from tests.observers.reference import DT, NOISE, PAPER
 WHOLE = 2000
 
 
-def floor_with_correlated_noise(noise: MeasurementNoise, h: float) -> float:
-    """The same floor in another form: of z = x2 - h/2 x1'', p = x1 - h^2/6 x1'', whose noises are correlated."""
-    v, n, c = noise.tilt, noise.acceleration, noise.correlation * noise.tilt * noise.acceleration
-    F, C = np.array([[1.0, h], [0.0, 1.0]]), np.array([[1.0, 0.0]])
-    input_vector, d = np.array([[-h * h], [-h]]), h * h / 6.0
-    Q, R = n * n * input_vector @ input_vector.T, np.array([[v * v - 2.0 * d * c + d * d * n * n]])
-    S = input_vector * (c - d * n * n)
-    P = solve_discrete_are(F.T, C.T, Q, R, s=S)
-    # x2 = z + h/2 (a - n): what p's innovation says of z and of n.
-    total = (P[0, 0] + R[0, 0]).item()
-    joint = np.array([[P[1, 1], 0.0], [0.0, n * n]])
-    covariance = np.array([P[0, 1], c - d * n * n])
-    residual = joint - np.outer(covariance, covariance) / total
-    weights = np.array([1.0, -h / 2.0])
-    return math.sqrt(weights @ residual @ weights)
-
-
-@pytest.mark.parametrize("noise", [NOISE, MeasurementNoise(0.0032, 0.21, 0.2), MeasurementNoise(1e-4, 3.0, -0.7)])
-@pytest.mark.parametrize("dt", [0.001, 0.005, 0.05])
-def test_floor_with_acceleration_in_another_form(noise: MeasurementNoise, dt: float) -> None:
-    assert acceleration_floor(noise, dt) == pytest.approx(floor_with_correlated_noise(noise, dt), rel=1e-6)
-
-
 def test_no_noise_no_floor() -> None:
     assert acceleration_floor(MeasurementNoise(0.0, 0.0, 0.9), DT) == 0.0
 

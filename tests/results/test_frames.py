@@ -58,14 +58,6 @@ def test_keys_iteration_and_look_up_agree(make: Callable[[], Any]) -> None:
         table["no such column"]
 
 
-def test_the_columns_of_a_result() -> None:
-    stood, error = many()["stood"], many()["velocity_rms_error_rad_s"]
-    assert stood[:2].tolist() == [True, False]
-    assert error[0] == many().summaries[0]["velocity_rms_error_rad_s"]
-    assert len(many()) == len(error) == many().table().num_rows
-    assert many()["in_loop_of"][0] is None
-
-
 def test_a_trajectory_as_a_frame() -> None:
     pandas = pytest.importorskip("pandas")
     one_world = trajectory(one())

@@ -127,10 +127,6 @@ def test_when_all_worlds_have_fallen_the_batch_ends() -> None:
 # --- randomness ----------------------------------------------------------------------------------------
 
 
-def test_the_same_seed_gives_the_same_batch() -> None:
-    assert_same_bits(recorded(experiment().run_many(4)), recorded(experiment().run_many(4)))
-
-
 def test_a_world_is_the_same_in_any_batch() -> None:
     """Whatever its place and the others."""
     whole, some = (recorded(experiment().run_many(worlds)) for worlds in (6, [5, 2]))

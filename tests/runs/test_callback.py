@@ -338,19 +338,6 @@ def test_leaving_steps_out_is_said() -> None:
         control(plant, controller, data)
 
 
-def test_a_reset_in_a_users_own_loop_restarts_the_controller() -> None:
-    plant = load_plant()
-    controller, data = cmg_mj.controller(plant, "linear", seed=4), plant.new_data()
-    ends = []
-    for _ in range(2):
-        plant.initialise(data)
-        for _ in range(60):
-            control(plant, controller, data)
-            mujoco.mj_step(plant.model, data)
-        ends.append(data.qpos.copy())
-    np.testing.assert_array_equal(*ends)
-
-
 def test_a_start_between_two_samples_of_a_slow_sensor() -> None:
     plant = load_plant()
     controller = cmg_mj.controller(plant, "linear", sensors=Sensors(accelerometer=Accelerometer(rate_hz=100.0)))

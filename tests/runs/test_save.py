@@ -125,11 +125,6 @@ def test_a_fall_is_beyond_30_degrees(tilt_deg: float, outcome: str) -> None:
     assert prepare(parse_scenario({"duration_s": 0.001, "plant": plant})).run().outcomes[0].kind == outcome
 
 
-def test_a_run_shorter_than_a_tick_has_one() -> None:
-    assert cmg_mj("run", write("duration_s = 0.001"), "--out", "it").status == 0
-    assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 1
-
-
 def test_a_run_without_a_tick_can_be_written() -> None:
     """An interrupt may come before the first."""
     experiment = prepare(load_scenario(write("duration_s = 0.1")))

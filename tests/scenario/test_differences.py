@@ -38,12 +38,9 @@ def test_nothing_differs() -> None:
     ("setting", "field", "value", "name"),
     [
         ("plant.equilibrium_bias_deg=1", "plant.equilibrium_bias_deg", 1.0, "equilibrium_bias_deg=1"),
-        ("sensors.encoder.rate_hz=100", "sensors.encoder.rate_hz", 100.0, "rate_hz=100"),
         ("observer.k1=30", "observer.k1", 30, "k1=30"),
-        ("push.0.torque_n_m=-1.5", "push.0.torque_n_m", -1.5, "torque_n_m=-1.5"),
         ("push=[]", "push", [], "push=none"),
         ("open_loop_observers=[ltv]", "open_loop_observers", ["ltv"], "open_loop_observers=ltv"),
-        ("plant.lock_thrust_bearing=true", "plant.lock_thrust_bearing", True, "lock_thrust_bearing=true"),
         ("controller.gains=[30, 4, -1, 0.3]", "controller.gains", [30, 4, -1, 0.3], "gains=30_4_-1_0.3"),
     ],
 )

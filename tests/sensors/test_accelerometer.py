@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -137,38 +136,6 @@ def test_the_outers_sample_is_older_by_the_skew(skew_s: float) -> None:
     np.testing.assert_allclose(result[:, :2], np.outer(times, (1.0, 2.0)), atol=1e-14)
     older = np.maximum(times - skew_s, 0.0)
     np.testing.assert_allclose(result[:, 2:], np.outer(older, (3.0, 4.0)), atol=1e-14)
-
-
-@pytest.mark.parametrize("driver", ["native", "callback"])
-@pytest.mark.parametrize(("skew_s", "together_hz"), [(0.0025, 400), (0.005, 200)])
-def test_the_loop_meets_the_older_instant(
-    driver: Any, skew_s: float, together_hz: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A rig that nothing controls falls the same whatever the sensors show: the readings are those of the instants."""
-    samples: list[tuple] = []
-
-    class RecordingTilt(RadialTilt):
-        def __call__(self, *forces: Any) -> Any:
-            samples.append(forces)
-            return super().__call__(*forces)
-
-    def readings(rate_hz: int, *settings: str) -> np.ndarray:
-        samples.clear()
-        off = ["noise_density_ug_rthz=0", "counts_per_g=0", f"rate_hz={rate_hz}"]
-        free = ["duration_s=0.3", "push.0.start_s=0.1", "controller.gains=[0.0,0.0,0.0,0.0]", "plant.timestep_s=0.0025"]
-        sensor = [f"sensors.accelerometer.{name}" for name in (*off, *settings)]
-        experiment = push_recovery(*free, *sensor, f"controller.rate_hz={rate_hz}")
-        axis = replace(experiment.plant.axis, radial_tilt=RecordingTilt(TILT.r_inner, TILT.r_outer))
-        monkeypatch.setattr(experiment.plant, "axes", (axis,))
-        experiment.run(driver=driver)
-        return np.array(samples[1:])  # the first was to know what tilt the offsets make at rest
-
-    together = readings(together_hz)
-    skewed = readings(200, f"skew_s={skew_s}")
-    every = together_hz // 200
-    np.testing.assert_array_equal(skewed[:, :2], together[::every, :2])
-    np.testing.assert_array_equal(skewed[1:, 2:], together[every - 1 : -1 : every, 2:][: len(skewed) - 1])
-    assert np.abs(skewed[1:, 2:] - together[::every, 2:][1:]).max() > 0.1
 
 
 # --- low-pass ----------------------------------------------------------------------------------------------

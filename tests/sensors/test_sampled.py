@@ -206,13 +206,10 @@ COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s"
     [
         pytest.param(200.0, 0.0, [0, 5, 10, 15, 20, 25], id="control rate"),
         pytest.param(100.0, 0.0, [0, 0, 10, 10, 20, 20], id="slower is held"),
-        pytest.param(1000.0, 0.0, [0, 5, 10, 15, 20, 25], id="faster shows the newest"),
         pytest.param(125.0, 0.0, [0, 0, 8, 8, 16, 24], id="no multiple of the other"),
         pytest.param(200.0, 0.005, [0, 0, 5, 10, 15, 20], id="one period late"),
-        pytest.param(200.0, 0.003, [0, 0, 5, 10, 15, 20], id="late by less than a period"),
         pytest.param(1000.0, 0.003, [0, 2, 7, 12, 17, 22], id="fast and late"),
         pytest.param(200.0, 0.012, [0, 0, 0, 0, 5, 10], id="late by more than two periods"),
-        pytest.param(50.0, 0.01, [0, 0, 0, 0, 0, 0], id="slow and late"),
     ],
 )
 def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, expected: list[int]) -> None:
@@ -263,18 +260,3 @@ def test_streams_are_uncorrelated_standard_normals() -> None:
         assert_sigma(stream, 1.0)
         assert_mean(stream, 0.0, 1.0)
         assert abs(np.corrcoef(stream[:-1], stream[1:])[0, 1]) < stats.norm.ppf(0.9999) / math.sqrt(N)
-
-
-def test_sensors_of_a_run_do_not_share_noise() -> None:
-    """The gyro's noise and the tilt's in the loop, and two worlds' and two seeds'."""
-    settings = ["duration_s=2.5", "push=[]", "controller.feedback=truth", "sensors.fog.bandwidth_hz=0"]
-    noises = []
-    for seed, world in ((0, 0), (0, 1), (1, 0)):
-        experiment = push_recovery(*settings, f"seed={seed}")
-        trajectory = recorded(experiment.run(world=world))
-        x1, e = trajectory["x1_rad"], experiment.plant.bias
-        noises += [trajectory["fog_rad_s"] - trajectory["x2_rad_s"], trajectory["y1_rad"] - (x1 - e)]
-    noises = np.array(noises)[:, 1:]
-    correlation = np.corrcoef(noises)[np.triu_indices(len(noises), 1)]
-    assert np.abs(correlation).max() < stats.norm.ppf(1.0 - 0.0005 / len(correlation)) / math.sqrt(noises.shape[1])
-    assert_sigma(noises[0], 0.02 / 60.0 * math.pi / 180.0 * math.sqrt(200.0))

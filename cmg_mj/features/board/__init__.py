@@ -38,12 +38,11 @@ def temporary_export(controller: Controller) -> Iterator[tuple[str, Path]]:
 
 
 @contextmanager
-def on_a_board(controller: Controller, *, counting: bool = False) -> Iterator[Board]:
+def on_a_board(controller: Controller) -> Iterator[Board]:
     """Export a controller, build it, and start an emulated board with it.
 
     Args:
         controller: The controller.
-        counting: Whether the board counts instructions, which makes it slower.
 
     Yields:
         The board, which stops at the end.
@@ -54,6 +53,6 @@ def on_a_board(controller: Controller, *, counting: bool = False) -> Iterator[Bo
     """
     require()
     with temporary_export(controller) as (observer, folder):
-        board = Board(build(observer, folder).path, counting=counting)
+        board = Board(build(observer, folder).path)
     with board:  # it has loaded its image: the files may go
         yield board

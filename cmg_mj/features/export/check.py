@@ -16,6 +16,7 @@ import numpy as np
 from cmg_mj.core.arrays import clip
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.types import STATE_SIGNALS
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.compiler import build, run
 from cmg_mj.features.export.constants import Constants
@@ -120,7 +121,7 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
 
 def columns(controller: Controller) -> list[str]:
     """Name the compared columns: the parts of an estimate, and u."""
-    return ["x1_rad", "x2_rad_s", "x3_rad", *controller.extra_signals[0], "u_rad_s"]
+    return [*STATE_SIGNALS, *controller.extra_signals[0], "u_rad_s"]
 
 
 def rounded(controller: Controller, expected: np.ndarray, precision: Precision) -> np.ndarray:

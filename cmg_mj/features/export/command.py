@@ -6,12 +6,11 @@ from typing import Literal
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
+from cmg_mj.cli.arguments import RunArguments, claim_output, export_options, json_option, out_option
 from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 
 
-@click.command(short_help="Write an observer and the control law around it as C code.")
-@click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
+@click.command()
 @out_option()
 @click.option(
     "--precision",
@@ -21,14 +20,7 @@ from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, sh
     help="Precision of all numbers in the C code.",
 )
 @click.option("--name", metavar="NAME", help="Prefix of files, types and functions.  [default: OBSERVER's name]")
-@click.option(
-    "--scenario",
-    default="push_recovery",
-    show_default=True,
-    metavar="NAME",
-    help="Scenario that gives the plant, the gains and the rates.",
-)
-@settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
+@export_options
 @json_option()
 @users_code()
 def export(

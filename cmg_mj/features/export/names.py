@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Collection, Sequence
 
 from cmg_mj.core.errors import InputError, shown
-from cmg_mj.core.types import Observer
+from cmg_mj.core.types import STATE_SIGNALS, Observer
 from cmg_mj.observers import OBSERVERS
 
 RESERVED = frozenset(
@@ -131,4 +131,4 @@ def name_of(observer: Observer, user_name: str | None = None) -> str:
 
 def estimate_places(extra_signals: tuple[str, ...]) -> list[str]:
     """Name the parts of an estimate in C, without the NAME_ before them."""
-    return identifiers([(part.upper(),) for part in ("x1_rad", "x2_rad_s", "x3_rad", *extra_signals)], MACROS)
+    return identifiers([(part.upper(),) for part in (*STATE_SIGNALS, *extra_signals)], MACROS)

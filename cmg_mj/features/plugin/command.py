@@ -6,27 +6,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import RunArguments, check_observer, claim_output, json_option, out_option, settings_option
+from cmg_mj.cli.arguments import RunArguments, claim_output, export_options, json_option, out_option
 from cmg_mj.cli.terminal import note, note_hints, say_written, shell_command, show, users_code
 
 if TYPE_CHECKING:
     from cmg_mj.features.plugin.make import Start
 
 
-@click.command(short_help="Compile the controller into MuJoCo: a library, and a model.")
-@click.argument("observer", callback=lambda context, parameter, name: check_observer("OBSERVER", name))
+@click.command()
 @out_option()
 @click.option(
     "--name", metavar="NAME", help="Name of the plugin, behind the prefix cmg_mj.  [default: OBSERVER's name]"
 )
-@click.option(
-    "--scenario",
-    default="push_recovery",
-    show_default=True,
-    metavar="NAME",
-    help="Scenario that gives the plant, the sensors, the gains and the rates.",
-)
-@settings_option("Set a field of the scenario, such as observer.k1=25 or controller.rate_hz=400.")
+@export_options
 @click.option(
     "--start",
     type=click.Choice(["keyframe", "spinning"]),

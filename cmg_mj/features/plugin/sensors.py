@@ -10,7 +10,7 @@ import numpy as np
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import CORNERS_HZ, NoiseStream, spread_of
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -136,7 +136,6 @@ def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
     """Describe an axis but for its controller: `axis_type` in C."""
     controller = axis.controller
     pair, encoder, fog = controller.sensors.accelerometer, controller.sensors.encoder, controller.sensors.fog
-    counts, turn = pair.counts_per_g, encoder.counts_per_revolution
     return {
         "prefix": axis.prefix,
         "gimbals": len(axis.modules),
@@ -148,8 +147,8 @@ def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
         },
         "settings": {  # what a model's <config> may change
             "force_sigma": pair.raw_sigma,
-            "force_step": STANDARD_GRAVITY / counts if counts else 0.0,
-            "angle_step": 2.0 * math.pi / turn if turn else 0.0,
+            "force_step": pair.resolution,
+            "angle_step": encoder.resolution,
         },
         **({"fog": _describe_fog(fog, controller.axis, clock)} if controller.feedback == "fog" else {}),
         "raw_rate": pair.raw_rate_hz,
@@ -195,7 +194,7 @@ def _describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
     return {
         "stream": NoiseStream.FOG.on_axis(axis),
         "period": clock.count(1.0 / sensor.rate_hz),
-        "share": 1.0 - math.exp(-2.0 * math.pi * sensor.bandwidth_hz / sensor.rate_hz) if sensor.bandwidth_hz else 1.0,
+        "share": sensor.step_share,
         "bias": math.radians(sensor.bias_deg_h) / 3600.0,
         "sigma": sensor.white_noise_sigma,
         "limit": math.radians(sensor.range_deg_s),
@@ -219,6 +218,6 @@ def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
 
 
 def _flicker(floor: float, dt: float) -> Struct:
-    """Compute the numbers of 1/f noise, as `Flicker` does."""
-    sigma, decay = spread_of(floor), np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
-    return {"flicker_sigma": sigma, "decay": decay.tolist(), "spread": (sigma * np.sqrt(1.0 - decay**2)).tolist()}
+    """Return the numbers of 1/f noise."""
+    noise = FlickerNoise(floor, dt, np.zeros(len(CORNERS_HZ)))
+    return {"flicker_sigma": spread_of(floor), "decay": noise.decay.tolist(), "spread": noise.spread.tolist()}

@@ -23,9 +23,9 @@ from cmg_mj.cli.terminal import (
     CtrlC,
     end_interrupted,
     final_path,
+    open_recording,
     progress,
     say_written,
-    shell_command,
     show,
     users_code,
 )
@@ -113,7 +113,7 @@ def log_options(command: Command) -> Command:
             texts = assignments(options[name], f"--{name}")
             options[name] = {role: finite(text, f"--{name} {role}") for role, text in texts.items()}
         if options["radii_m"] is not None:
-            options["radii_m"] = _pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
+            options["radii_m"] = pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
             options["time_range_s"] = span(options["time_range_s"], "--time-range")
         command(options=ReadOptions(**options), **given)
@@ -121,7 +121,8 @@ def log_options(command: Command) -> Command:
     return all_of(*_OPTIONS)(with_options)
 
 
-def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
+def pair(text: str, separator: str, option: str, example: str) -> tuple[float, float]:
+    """Parse two finite numbers with a separator between, such as an option's `0.05,0.15`."""
     first, _, second = text.partition(separator)
     try:
         pair = float(first), float(second)
@@ -134,13 +135,13 @@ def _pair(text: str, separator: str, option: str, example: str) -> tuple[float, 
 
 def span(text: str, option: str) -> tuple[float, float]:
     """Parse `10:60` into its ends [s]."""
-    start, end = _pair(text, ":", option, "START:END in seconds, such as 10:60")
+    start, end = pair(text, ":", option, "START:END in seconds, such as 10:60")
     if not start < end:
         raise InputError(f"{option} {text}: must end after its start")
     return start, end
 
 
-@click.command(short_help="Replay your own log through every observer.")
+@click.command()
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @log_options
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
@@ -228,6 +229,6 @@ def replay(
         finally:
             table = report.replay_markdown(results) if markdown else report.replay_tables(results)
             show(finite(report.replay_figures(results)), table, as_json)
-    say_written(folder, place, f"Open the recording: {shell_command('rerun', place / 'recording.rrd')}", as_json)
+    say_written(folder, place, open_recording(place), as_json)
     if ctrl_c.noted or len(results) < total:
         end_interrupted(f"interrupted; {len(results)} of {total} logs are in {final_path(folder, place)}")

@@ -54,10 +54,7 @@ class Segment:
 
     def when(self, stamps: np.ndarray) -> np.ndarray:
         """Convert other rows' stamps to times in this segment, beyond its ends too, (k,) [s]."""
-        before, after = self.stamps[0] - self.placed[0], self.stamps[-1] - self.placed[-1]
-        inside = np.interp(stamps, self.stamps, self.placed)
-        inside = np.where(stamps > self.stamps[-1], stamps - after, inside)
-        return np.where(stamps < self.stamps[0], stamps - before, inside)
+        return stamps + np.interp(stamps, self.stamps, self.placed - self.stamps)
 
 
 class WhiteNoise(NamedTuple):

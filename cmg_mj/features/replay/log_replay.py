@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError, raised
+from cmg_mj.core.errors import InputError, counted, raised
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
-from cmg_mj.core.types import extra_signals, needs
+from cmg_mj.core.types import STATE_SIGNALS, extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import SPAN_S, Alignment, alignment_of
@@ -24,7 +24,7 @@ from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observe
 from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
-from cmg_mj.results.trajectory import ESTIMATES, Layout, NamedColumns, Trajectory
+from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
 from cmg_mj.scenario.loading import parse_scenario
@@ -86,7 +86,9 @@ class ReplayResult(NamedColumns):
         columns = {name: values for name, values in self.log.columns.items() if np.isfinite(values).any()}
         for kind, signals in self.estimates.items():
             columns |= {f"estimate/{kind}/{name}": values for name, values in signals.items()}
-        extra = tuple(tuple(name for name in signals if name not in ESTIMATES) for signals in self.estimates.values())
+        extra = tuple(
+            tuple(name for name in signals if name not in STATE_SIGNALS) for signals in self.estimates.values()
+        )
         return Trajectory(columns, {}, Layout(tuple(self.estimates), extra, ()))
 
     @cached_property
@@ -136,8 +138,8 @@ def replay_log(
     scored = log.scored(settle_s)
     if scored.sum() < 10:
         raise InputError(
-            f"{log.name}: nothing is left to score: {log.duration_s:.3g} s in {len(log.parts)} "
-            f"part{'' if len(log.parts) == 1 else 's'}, without the first {settle_s:g} s of each (--settle-s)"
+            f"{log.name}: nothing is left to score: {log.duration_s:.3g} s in {counted(len(log.parts), 'part')}, "
+            f"without the first {settle_s:g} s of each (--settle-s)"
         )
     if "reference" in log.has and np.isfinite(log[REFERENCE][scored]).sum() < 10:
         raise InputError(f"{log.name}: the reference has no number where estimates are scored")
@@ -201,7 +203,7 @@ def _rate_of(log: Log) -> float:
 
 def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
     """Return the observer's estimates, part by part, NaN outside; or how it failed."""
-    estimates = {name: np.full(len(log), np.nan) for name in (*ESTIMATES, *extra_signals(observer))}
+    estimates = {name: np.full(len(log), np.nan) for name in (*STATE_SIGNALS, *extra_signals(observer))}
     for part in log.parts:
         try:
             with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, counted
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import (
@@ -277,7 +277,7 @@ def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     jumps = int((np.abs(np.diff(angle[known])) > UNWRAP_STEP).sum())
     if not jumps:
         return angle
-    notes.append(f"the tilt jumps by a turn {_counted(jumps, 'time')}: made to run on")
+    notes.append(f"the tilt jumps by a turn {counted(jumps, 'time')}: made to run on")
     out = angle.copy()
     out[known] = np.unwrap(angle[known])
     return out
@@ -340,7 +340,7 @@ def _sample(
         if which.any():
             at = int(np.argmax(np.where(which, steps, 0.0)))
             notes.append(
-                f"{_counted(which.sum(), 'gap')} {what}; the longest is {steps[at] * 1e3:.4g} ms at {time[at]:.6g} s"
+                f"{counted(which.sum(), 'gap')} {what}; the longest is {steps[at] * 1e3:.4g} ms at {time[at]:.6g} s"
             )
     lengths = [(time[rows][-1] - time[rows][0]) / dt for rows in stretches]
     if sum(lengths) > MAX_SAMPLES:
@@ -383,12 +383,11 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     missing = np.flatnonzero(~present)
     if len(missing):
         notes.append(
-            f"{_counted(len(missing), 'row')} of {len(present):,} without a number discarded, first row "
-            f"{missing[0] + 1}"
+            f"{counted(len(missing), 'row')} of {len(present):,} without a number discarded, first row {missing[0] + 1}"
         )
         time, values = time[present], _select(values, present)
     if len(time) < MIN_SAMPLES:
-        raise InputError(f"{path}: {_counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
+        raise InputError(f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
     steps = np.diff(time)
     if (steps < 0.0).any():
         at = int(np.argmax(steps < 0.0))
@@ -404,7 +403,7 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
             f"coarse; leave time out and give --rate {rate}"
         )
     if again.any():
-        rows, first = _counted(again.sum(), "row"), time[1:][again][0]
+        rows, first = counted(again.sum(), "row"), time[1:][again][0]
         notes.append(f"{rows} with the time of the row before discarded, first at {first:.6g} s")
         later = np.concatenate([[True], ~again])
         time, values = time[later], _select(values, later)
@@ -465,10 +464,6 @@ def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
 
 def _select(values: Values, rows: slice | np.ndarray) -> dict[str, np.ndarray]:
     return {name: column[rows] for name, column in values.items()}
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
 def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:

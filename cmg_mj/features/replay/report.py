@@ -13,7 +13,7 @@ from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import remarks_on
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S
 from cmg_mj.results.baselines import ZERO
-from cmg_mj.results.intervals import Interval, format_interval, known_interval
+from cmg_mj.results.intervals import Interval, finite_mean, finite_values, format_interval, known_ends
 from cmg_mj.results.summary_keys import Key, SummaryValue
 from cmg_mj.results.tables import Row, Table
 from cmg_mj.view.plots.style import observers_to_draw
@@ -76,13 +76,9 @@ def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]
         summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
         means[name] = {"logs": len(summaries)}
         for key in _keys(replays):
-            values = [value for summary in summaries if (value := summary.get(key)) is not None]
-            interval = known_interval(values, FIGURES[key].positive)
-            means[name][key] = {
-                "mean": sum(values) / len(values) if values else None,
-                "interval": [interval.low, interval.high] if interval else None,
-                "logs": len(values),
-            }
+            values = finite_values([summary.get(key) for summary in summaries])
+            interval = known_ends(values, FIGURES[key].positive)
+            means[name][key] = {"mean": finite_mean(values), "interval": interval, "logs": len(values)}
     return means
 
 

@@ -19,7 +19,7 @@ from cmg_mj.results.folder import RunFolder, write_text
 from cmg_mj.results.summary_keys import finite
 from cmg_mj.scenario.resolve import safe_name
 from cmg_mj.view.plots.figure import Line, Panel, Picture, Span, draw
-from cmg_mj.view.plots.run_plot import INK, MEASURED, SMALL_COLUMNS
+from cmg_mj.view.plots.run_plot import INK, MEASURED, SMALL_COLUMNS, limits
 from cmg_mj.view.plots.style import BASELINE_COLOURS, colours, short_names, thinned
 
 if TYPE_CHECKING:
@@ -27,23 +27,18 @@ if TYPE_CHECKING:
 
 DETAIL_S = 2.0
 """Length of the detail [s]."""
+RISE_S = 0.1
+"""Time over which the tilt rises, of whose differences the acceleration is seen [s]."""
 
 
 def liveliest_span(log: Log) -> tuple[float, float]:
-    """Return the ends of the span of `DETAIL_S` in which the tilt accelerates most [s]."""
-    length = max(2, round(DETAIL_S / log.dt))
-    rise = max(1, length // 20)
-    spans = []
-    for part in log.parts:
-        time, tilt = log["time_s"][part], log["y1_rad"][part]
-        bend = np.zeros(len(tilt))
-        bend[rise:-rise] = (tilt[2 * rise :] - 2.0 * tilt[rise:-rise] + tilt[: -2 * rise]) ** 2
-        sums = np.concatenate([[0.0], np.cumsum(bend)])
-        n = min(length, len(tilt))
-        bends = sums[n:] - sums[:-n]
-        start = int(np.argmax(bends))
-        spans.append((float(bends[start]), (float(time[start]), float(time[start + n - 1]))))
-    return max(spans)[1]
+    """Return the ends of the span of `DETAIL_S` around the largest acceleration of the tilt [s]."""
+    time, tilt = log.broken_time(), log.broken(log["y1_rad"])
+    rise = max(1, min(round(RISE_S / log.dt), len(tilt) // 4))
+    bends = np.nan_to_num(np.abs(np.diff(tilt[::rise], 2)))
+    middle = time[rise * (int(np.argmax(bends)) + 1)]
+    start, end = np.clip([middle - DETAIL_S / 2.0, middle + DETAIL_S / 2.0], time[0], time[-1]).tolist()
+    return start, end
 
 
 def plot_replay(path: Path, replayed: ReplayResult) -> None:
@@ -55,7 +50,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
     """
     log, few, key = replayed.log, shown_first(replayed), "velocity_rms_error_rad_s"
     rates = {name: estimates["x2_rad_s"] for name, estimates in replayed.estimates.items()}
-    labels = {name: label.lstrip("_") for name, label in short_names(list(rates)).items()}
+    labels = short_names(list(rates))
     reference = [log[REFERENCE]] if "reference" in log.has else []
     titles = dict(labels)
     for name in labels if reference else ():
@@ -70,9 +65,7 @@ def plot_replay(path: Path, replayed: ReplayResult) -> None:
         lines = [line(true, "reference", INK, 1.6, rows) for true in reference]
         return lines + [line(rates[name], labels[name], name, rows=rows) for name in names]
 
-    shown = [*reference, *(rates[name] for name in few)]
-    top = 1.05 * max((float(np.nanmax(np.abs(values))) for values in shown), default=0.0)
-    y_range = (-top, top) if top else None
+    y_range = limits([*reference, *(rates[name] for name in few)])
     shaded = [Span(*span, color="0.5")]
     panels = [
         Panel("tilt [deg]", [line(np.degrees(log["y1_rad"]), "measured", MEASURED)], shaded=shaded),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 VIEWERS = ("web", "native", "opengl", "opengl_software", "vulkan", "vulkan_software")
 
 
-@click.command(short_help="Open a scenario in MuJoCo Studio with its controller running.")
+@click.command()
 @click.argument("scenario")
 @observer_option()
 @settings_option()

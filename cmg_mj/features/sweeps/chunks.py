@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from cmg_mj.core.errors import InputError, RunStopped, raised
-from cmg_mj.features.sweeps.study import CHUNK, MAX_TRIALS, SweepStudy, Trial, varied_tracks
+from cmg_mj.features.sweeps.study import MAX_TRIALS, SweepStudy, Trial, varied_tracks
 from cmg_mj.inputs.files import find, model_files, read_toml
 from cmg_mj.results.folder import is_own, numbered, whole_file, write_marker
 from cmg_mj.results.summary_keys import ID_COLUMNS, KEYS, Summary, SummaryValue
@@ -84,7 +84,7 @@ def compute(
             results.update(dict.fromkeys(batch, unfinished("stopped", raised(error))))
             stopped = list(batch) if len(batch) > 1 else []
         else:
-            if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+            if result.interrupted:
                 raise KeyboardInterrupt
             rows = result.rows(observer if observer in study.baselines else None)
             results.update(zip(batch, rows, strict=True))
@@ -164,7 +164,7 @@ POINTS = 4096
 
 
 def estimate_cost(study: SweepStudy) -> dict[str, float]:
-    """Estimate minutes on this machine and memory, as far as a piece of every observer can say.
+    """Estimate minutes on this machine, as far as a piece of every observer can say.
 
     Returns:
         The figures that `--dry-run --json` prints.
@@ -173,11 +173,6 @@ def estimate_cost(study: SweepStudy) -> dict[str, float]:
     if study.trials > MAX_TRIALS and study.n_points > POINTS:  # points that lie alike, and are soon drawn
         thinned = replace(study, sample=POINTS)
     trials_an_observer = study.n_points * study.worlds
-    trials_a_chunk = min(CHUNK, trials_an_observer)
-    plants = min(study.n_points, -(-trials_a_chunk // study.worlds))
-    # By the peaks (VmHWM) of four sweeps on Linux: of 0.05 s, 2 points x 50 worlds, 1,000 x 100, 5,000 x 1: 232, 252
-    # and 372 MB; of 15 s, 1 x 1,024: 365 MB.
-    a_chunk = (0.015 + 0.008 * study.scenario.duration_s) * trials_a_chunk + 0.12 * plants
     return {
         "points": study.n_points,
         "observers": len(study.observers),
@@ -185,7 +180,6 @@ def estimate_cost(study: SweepStudy) -> dict[str, float]:
         "trials": study.trials,
         "chunks": study.n_chunks,
         "minutes": sum(_seconds_a_trial(thinned, name) for name in study.observers) * trials_an_observer / 60.0,
-        "memory_mb": 230.0 + a_chunk + 200.0 * study.trials / 2**20,
     }
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cmg_mj.features.sweeps.study import SweepStudy
 
 
-@click.command(short_help="Run a scenario with varied fields, observers and noise.")
+@click.command()
 @run_options
 @click.option(
     "--vary",
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     "log:first:last:count. With --sample also low:high. Fields joined by + take the same values. May be "
     "given again: the sweep runs every combination.",
 )
-@observers_option("the scenario's", distinct=False, baselines=True)
+@observers_option("the scenario's", baselines=True)
 @worlds_option("Worlds of each cell.  [default: 20]")
 @click.option(
     "--sample", type=click.IntRange(1), metavar="N", help="Run N points of a quasi-random design instead of a grid."
 )
-@click.option("--dry-run", is_flag=True, help="Print the number of trials, time and memory, and run nothing.")
+@click.option("--dry-run", is_flag=True, help="Print the number of trials and the time, and run nothing.")
 @click.option(
     "--cluster",
     metavar="ADDRESS",
@@ -85,14 +85,14 @@ def sweep(
         cost = estimate_cost(study)
         text = (
             "{points} points x {observers} observers x {worlds} worlds = {trials} trials in {chunks} chunks; "
-            "about {minutes:.2g} min on this machine, {memory_mb:.0f} MB"
+            "about {minutes:.2g} min on this machine"
         )
         show(cost, text.format(**cost), arguments.as_json)
         return
     if study.trials > MAX_TRIALS and not yes:
         raise InputError(
             f"{study.n_points} points, {study.trials} trials: for more than {MAX_TRIALS} give --yes "
-            "(--dry-run prints time and memory)"
+            "(--dry-run prints the time)"
         )
     path = output_path(arguments.out, f"sweep-{safe_name(Path(arguments.name).stem)}")
     with running as run:
@@ -125,7 +125,6 @@ def _study(
     """Make the study of the command's options, which precede those of a study file."""
     from cmg_mj.features.sweeps.study import SweepStudy, locate_tracks, parse_axis, read_study
     from cmg_mj.inputs.files import find
-    from cmg_mj.scenario.loading import load_scenario
 
     settings = [setting.partition("=") for setting in varied]
     axes = [parse_axis(field, values, f"--vary {field}{equals}{values}") for field, equals, values in settings]
@@ -135,9 +134,7 @@ def _study(
     if isinstance(file.scenario, str):
         scenario = replace(arguments, name=file.scenario).scenario()
     else:
-        scenario = load_scenario(arguments.name, arguments.settings, fields=file.scenario)
-        if arguments.seed is not None:
-            scenario = scenario.model_copy(update={"seed": arguments.seed})
+        scenario = arguments.scenario(fields=file.scenario)
     beside = find("scenarios", arguments.name, ".toml", "scenario").parent
     return SweepStudy(
         scenario,

@@ -6,14 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.errors import counted
 from cmg_mj.features.sweeps.cells import Trials, baselines_ahead, fall_shares, least, least_error, with_ends
-from cmg_mj.features.sweeps.study import VariedField, counted
+from cmg_mj.features.sweeps.study import VariedField
 from cmg_mj.results.summary_keys import heading
-from cmg_mj.view.plots.figure import pyplot
+from cmg_mj.view.plots.figure import pyplot, scale_of
 from cmg_mj.view.plots.style import colours, hexadecimal
 
 ERRORS = ("velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s")
@@ -30,8 +31,6 @@ MAX_NUMBERS = 8
 LABEL = {"facecolor": "w", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
 NOBODY, EMPTY = "none, or several alike", (232, 232, 232)
 """Name and colour of a cell without a best."""
-LOGARITHMIC = 10.0
-"""Values that differ by more than this factor have a logarithmic scale."""
 
 
 class Picture(NamedTuple):
@@ -117,12 +116,6 @@ def error_curve(worlds: np.ndarray) -> np.ndarray:
     known = np.isfinite(worlds).sum(axis=1)
     ends = [list(with_ends("", point, positive=True).values()) for point in worlds]
     return np.column_stack([np.array(ends, dtype=float), (known > 0) & (known < worlds.shape[1])])
-
-
-def scale_of(values: np.ndarray) -> Literal["linear", "log"]:
-    """Choose a logarithmic scale for positive values of more than one decade."""
-    known = values[np.isfinite(values)]
-    return "log" if 0.0 < LOGARITHMIC * known.min() < known.max() else "linear"
 
 
 def maps(trials: Trials, across: VariedField, up: VariedField) -> dict[str, Map]:

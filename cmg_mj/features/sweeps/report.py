@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cmg_mj.core.errors import InputError, listed
+from cmg_mj.core.errors import InputError, counted, listed
 from cmg_mj.features.sweeps.cells import (
     CLOSE,
     Trials,
@@ -23,7 +23,7 @@ from cmg_mj.features.sweeps.cells import (
 )
 from cmg_mj.features.sweeps.chunks import CELLS, REPORT, RESUMES, TRIALS, Store, trials_schema
 from cmg_mj.features.sweeps.pictures import CURVES, ERRORS, Picture, pictures_of
-from cmg_mj.features.sweeps.study import SweepStudy, VariedField, counted
+from cmg_mj.features.sweeps.study import SweepStudy, VariedField
 from cmg_mj.results.folder import whole_file, write_text
 from cmg_mj.results.intervals import finite_mean
 from cmg_mj.results.summary_keys import Summary, SummaryValue, capitalised, format_figure, heading

@@ -21,7 +21,7 @@ from cmg_mj.core.errors import InputError, nearest, shown
 from cmg_mj.core.types import law_needs
 from cmg_mj.inputs.files import find, read_toml, whole_path
 from cmg_mj.inputs.messages import complaints
-from cmg_mj.inputs.overrides import assign, override
+from cmg_mj.inputs.overrides import assign, value_of
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import Plant, load_scenario_plant
@@ -159,10 +159,7 @@ def _parse_list(text: str, where: str) -> list[Any]:
         words = [word.strip() for word in text.split(",")]
         if "" in words or any(mark in text for mark in "[]{}\"'="):
             raise InputError(f"{where}: {text!r} is no list; write values with commas between") from None
-        values: dict[str, Any] = {}
-        for place, word in enumerate(words):
-            override(values, f"{place}={word}")
-        return list(values.values())
+        return [value_of(word) for word in words]
 
 
 # --- the study
@@ -188,8 +185,6 @@ BASELINE_LOOP = "linear"
 """Observer that runs where a baseline's trials have the true rate in the loop; nothing depends on it."""
 BASELINE_SETTINGS = {"feedback": "truth", "angle_source": "measured", "bias_trim_s": 0.0}
 """Fields of [controller] of a baseline's loop: with others the loop would depend on `BASELINE_LOOP`."""
-MAX_ALONE = 200
-"""Values of a field that is varied alone that are tried before the sweep, at 5 ms each; the last one is, too."""
 
 
 @dataclass(frozen=True)
@@ -356,11 +351,6 @@ class SweepStudy:
         }
 
 
-def counted(n: int, noun: str) -> str:
-    """Put a number before a noun: `1 world`, `2 worlds`."""
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
-
-
 def sampled(dimensions: int, n: int, seed: int) -> np.ndarray:
     """Spread points evenly in the unit cube, (n, dimensions)."""
     from scipy.stats import qmc  # half a second
@@ -384,15 +374,14 @@ def check_values(study: SweepStudy) -> None:
     bases = [study.scenario_with(observer) for observer in study.observers]
     for base in bases:
         prepare(base, plant)
+    alone = len(study.axes) == 1  # a value takes 5 ms
     for axis in study.axes:
         of_observer = any(field.startswith("observer.") for field in axis.fields)
         if of_observer and study.baselines:
             raise InputError(f"--vary {axis.option}: a baseline has no parameters; leave {study.baselines[0]} out")
-        values = axis.values or (axis.low, axis.high)
-        for i, value in enumerate(values):
+        for value in axis.values or (axis.low, axis.high):
             if "plant.model" in axis.fields:
                 find("models", str(value), ".xml", f"--vary {axis.option}: plant.model =")
-            alone = len(study.axes) == 1 and (i < MAX_ALONE or i == len(values) - 1)
             for base in bases if of_observer else bases[:1]:
                 fields = base.as_fields()
                 for field in axis.fields:

@@ -31,7 +31,7 @@ from cmg_mj.cli.terminal import (
     users_code,
 )
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.replay.command import log_options, noise_option, pendulum_option
+from cmg_mj.features.replay.command import log_options, noise_option, pair, pendulum_option
 
 if TYPE_CHECKING:
     from cmg_mj.features.replay.log import ReadOptions
@@ -51,7 +51,7 @@ parameter_options = all_of(
 """The options that select the parameters to tune."""
 
 
-@click.command(short_help="Fit an observer's parameters to the gyro of a scenario.")
+@click.command()
 @observer_option("to tune")
 @run_options
 @worlds_option(
@@ -114,7 +114,7 @@ def tune(
         end_interrupted(f"interrupted; {len(study.levels)} of {total} noise levels are in {final_path(folder, place)}")
 
 
-@click.command("tune-log", short_help="Fit an observer's parameters to the reference of your own logs.")
+@click.command("tune-log")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @observer_option("to tune", required=True)
 @log_options
@@ -212,15 +212,9 @@ def tune_log(
 
 def _ranges(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
     """Parse texts such as `L=10.4:1000`."""
-    ranges = {}
-    for text in texts:
-        name, _, ends = text.partition("=")
-        low, _, high = ends.partition(":")
-        try:
-            ranges[name.strip()] = float(low), float(high)
-        except ValueError as error:
-            raise InputError(f"--range {text!r}: write NAME=LOW:HIGH, for example tau=0.005:0.1") from error
-    return ranges
+    parts = [text.partition("=") for text in texts]
+    how = "NAME=LOW:HIGH, for example tau=0.005:0.1"
+    return {name.strip(): pair(ends, ":", f"--range {name} =", how) for name, _, ends in parts}
 
 
 def _densities(text: str) -> list[float]:

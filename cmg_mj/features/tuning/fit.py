@@ -57,13 +57,11 @@ class ScoringData:
     Attributes:
         references: The rate of each recording that estimates are compared with, (n,) or (n, n_worlds) [rad/s].
         stretches: Number of a recording, and its rows that are scored together.
-        largest_acceleration: Largest acceleration of the tilt, by differences of its rate [rad/s^2].
         fell: Number of worlds that fell and are not scored.
     """
 
     references: Sequence[np.ndarray]
     stretches: Sequence[tuple[int, np.ndarray]]
-    largest_acceleration: float
     fell: int = 0
 
     def rates(self, observers: Any) -> list[np.ndarray]:
@@ -134,7 +132,6 @@ class NoiseLevelResult:
         rms: On the held-out worlds, tuned, (n_worlds,) [rad/s].
         given_rms: On the held-out worlds, given, (n_worlds,) [rad/s].
         zero_rms: Error of an estimate of zero, mean over the held-out worlds [rad/s].
-        largest_acceleration: Largest acceleration of the tilt in the fitted worlds [rad/s^2].
         fell: Number of worlds that fell and are discarded.
     """
 
@@ -147,7 +144,6 @@ class NoiseLevelResult:
     rms: np.ndarray
     given_rms: np.ndarray
     zero_rms: float
-    largest_acceleration: float
     fell: int
 
     @property
@@ -196,7 +192,6 @@ class NoiseLevelResult:
             "held_out_ratio": list(self.ratio),
             "verdict": self.verdict,
             "zero_estimate_rms_error_rad_s": self.zero_rms,
-            "largest_tilt_acceleration_rad_s2": self.largest_acceleration,
         }
 
 
@@ -314,7 +309,6 @@ class ParameterFit:
             rms=errors(tuned, held_out),
             given_rms=errors(self.start_parameters, held_out),
             zero_rms=held_out.zero_rms,
-            largest_acceleration=fitted.largest_acceleration,
             fell=fitted.fell + held_out.fell,
         )
 

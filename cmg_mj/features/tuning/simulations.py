@@ -62,8 +62,6 @@ class Recorded(ScoringData):
         self.trajectory, self.fell = trajectory, fell
         self.references = [trajectory["fog_rad_s"]]
         self.stretches = [(0, inside(trajectory["time_s"], windows))]
-        steps = np.diff(trajectory["x2_rad_s"], axis=0) / np.diff(trajectory["time_s"])[:, None]
-        self.largest_acceleration = float(np.abs(steps).max(initial=0.0))
 
     def rates(self, observers: Observer) -> list[np.ndarray]:
         """See `ScoringData`."""
@@ -120,7 +118,7 @@ def recorder(
     jobs = [BatchJob([prepare(tuning_scenario(scenario, noise))] * len(worlds), worlds) for worlds, noise in requests]
     windows, recordings = windows_of(scenario), {}
     for request, job, result in zip(requests, jobs, run_jobs(jobs), strict=True):
-        if any(outcome.kind == "interrupted" for outcome in result.outcomes):
+        if result.interrupted:
             raise KeyboardInterrupt
         loop, stood = job.experiments[0].scenario, result.stood
         if stood.sum() < 2:

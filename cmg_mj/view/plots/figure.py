@@ -21,6 +21,8 @@ ROW_OF_LABELS = 110
 """Characters of a legend that fit into a row."""
 HEIGHT, FIRST_HEIGHT, SMALL_HEIGHT = 2.3, 1.6, 1.25
 """Heights of a panel, of a first one and of a small one below [inch]."""
+LOGARITHMIC = 10.0
+"""Values that differ by more than this factor have a logarithmic scale."""
 PAGE_WIDTH, COLUMN_WIDTH = 9.0, 5.5
 """Widths of a page, and of each of several columns [inch]."""
 
@@ -124,6 +126,12 @@ def pyplot() -> ModuleType:
     return plt
 
 
+def scale_of(values: np.ndarray) -> Literal["linear", "log"]:
+    """Choose a logarithmic scale for positive values of more than one decade."""
+    known = values[np.isfinite(values)]
+    return "log" if 0.0 < LOGARITHMIC * known.min() < known.max() else "linear"
+
+
 def save_figure(path: Path, figure: Figure, title: str, dpi: int) -> None:
     """Give a figure its title, write it as PNG, and close it."""
     figure.suptitle(title, x=0.01, ha="left", parse_math=False)
@@ -175,7 +183,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     palette = {name: hexadecimal(rgb) for name, rgb in colours(names).items()}
     for line in panel.lines:
         color = f"C{line.color}" if isinstance(line.color, int) else palette.get(line.color or "", line.color)
-        style = {"linewidth": line.width, "label": line.label or None}
+        label = line.label.lstrip("_")  # matplotlib hides one that begins with an underscore
+        style = {"linewidth": line.width, "label": label or None}
         if color is not None:  # the format may have one
             style["color"] = color
         (curve,) = axes.plot(line.x, line.y, line.style, markersize=4, **style)

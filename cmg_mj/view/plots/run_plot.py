@@ -57,8 +57,7 @@ def plot_run(path: Path, header: RecordingHeader, run: Run) -> None:
     summaries = run.observers
     few = observers_to_draw(summaries, always=trajectory.observers[:1])
     others = [name for name in trajectory.observers if name not in few]
-    # matplotlib hides a label that begins with an underscore
-    labels = {name: label.lstrip("_") for name, label in short_names(trajectory.observers).items()}
+    labels = short_names(trajectory.observers)
     key = next((key for key in RANKING_KEYS if any(summaries[name].get(key) is not None for name in few)), "")
 
     def line(values: np.ndarray, label: str, color: str, width: float = 0.8) -> Line:
@@ -81,28 +80,28 @@ def plot_run(path: Path, header: RecordingHeader, run: Run) -> None:
         rates.append(line(estimate, f"{labels[name]} $\\hat x_2$", name))
         errors.append(line(estimate - true, labels[name] + rms, name))
     # Errors on a scale of their own would look large.
-    limits = _limits([curve.y for curve in [*rates, *errors]])
+    y_range = limits([curve.y for curve in [*rates, *errors]])
     gimbal = [true_line("x3_rad", "true $x_3$", scale=np.degrees(1.0))]
     command = [true_line("u_rad_s", "command $u$", 0.6)]
     spans = list(_spans(ends, pushes, swings))
     unnamed = [span._replace(label="") for span in spans]
     panels = [
         Panel("tilt [deg]", [*tilt, *bounds(header.settings.settle_band_deg, "settle band")], shaded=spans),
-        Panel("tilt rate\n[rad/s]", rates, shaded=unnamed, y_range=limits),
-        Panel("error $\\hat x_2 - x_2$\n[rad/s]", errors, shaded=unnamed, y_range=limits),
+        Panel("tilt rate\n[rad/s]", rates, shaded=unnamed, y_range=y_range),
+        Panel("error $\\hat x_2 - x_2$\n[rad/s]", errors, shaded=unnamed, y_range=y_range),
         Panel("gimbal angle\n[deg]", gimbal, shaded=unnamed),
         Panel("gimbal rate\n[rad/s]", [*command, *bounds(header.rate_limit_rad_s, "rate limit")], shaded=unnamed),
     ]
     for name in others:
         curves = [line(trajectory[f"estimate/{name}/x2_rad_s"], "", name, 0.5), true_line("x2_rad_s", "", 0.8)]
-        panels.append(Panel("tilt rate [rad/s]", curves, labels[name], shaded=unnamed, y_range=limits))
+        panels.append(Panel("tilt rate [rad/s]", curves, labels[name], shaded=unnamed, y_range=y_range))
     columns = max(SMALL_COLUMNS, -(-len(others) // SMALL_ROWS))
     draw(path, Picture("plot", title, panels, columns=columns, n_first=5))
 
 
-def _limits(curves: Sequence[Sequence[float] | np.ndarray]) -> tuple[float, float] | None:
+def limits(curves: Sequence[Sequence[float] | np.ndarray]) -> tuple[float, float] | None:
     """Return the ends of an axis with the finite values of some curves; None if there is no value."""
-    values = np.concatenate(curves)
+    values = np.concatenate([*curves, []])
     values = values[np.isfinite(values)]
     if not len(values):
         return None

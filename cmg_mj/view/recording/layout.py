@@ -98,7 +98,7 @@ def _board(name: str, branches: Sequence[Branch], pages: Sequence[str]) -> rrb.C
     first, *others = branches
     best = [branch for branch in branches if branch.entry.is_best] if others else [first]
     kinds = (COMPARED_TILT_PLOTS, COMPARED_ACTUATOR_PLOTS) if others else (TILT_PLOTS, ACTUATOR_PLOTS)
-    columns = [[plot for plot in plots if _rows(plot, first)] for plots in kinds]
+    columns = [[plot for plot in plots if rows_of(plot, first)] for plots in kinds]
     shown = [entry.name for entry in first.observers if entry.is_best]
     left, right = (
         [_overlay_view(plot, branches) if others else plot_view(plot, first, shown) for plot in plots]
@@ -119,7 +119,7 @@ def _board(name: str, branches: Sequence[Branch], pages: Sequence[str]) -> rrb.C
     )
 
 
-def _rows(plot: Plot, branch: Lines) -> list[str]:
+def rows_of(plot: Plot, branch: Lines) -> list[str]:
     """List the paths of a plot's series."""
     return [path for path in branch.series if path.startswith(plot.entities)]
 
@@ -132,7 +132,7 @@ def plot_view(plot: Plot, branch: Lines, best: Collection[str]) -> rrb.View:
         branch: The run or log.
         best: Names of the observers that are switched on; if none of them is in the plot, a few others are.
     """
-    by_observer = {path: branch.series[path].observer for path in _rows(plot, branch)}
+    by_observer = {path: branch.series[path].observer for path in rows_of(plot, branch)}
     estimating = {name: {} for name in by_observer.values() if name}
     shown = set(best) & set(estimating) or set(observers_to_draw(estimating))
     off = [path for path, name in by_observer.items() if name and name not in shown]
@@ -145,7 +145,7 @@ def _overlay_view(plot: Plot, branches: Sequence[Branch]) -> rrb.View:
     overrides = {}
     for branch in branches:
         observers = ("", branch.run.trajectory.observers[0])
-        path = next(path for path in _rows(plot, branch) if branch.series[path].observer in observers)
+        path = next(path for path in rows_of(plot, branch) if branch.series[path].observer in observers)
         overrides[f"{branch.path}/{path}"] = rr.SeriesLines(
             colors=[branch.entry.color],
             names=[branch.label],
@@ -222,14 +222,8 @@ def _summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
         parts = [estimates_table("", figures, keys, named=False).markdown() for keys in ROW_TABLES]
         lost = [branch for branch in branches if branch.run.outcome.kind != "done"]
         parts += [BOLD, *(f"**{branch.label}**: {outcomes[branch.label]}" for branch in lost)]
-    torques = [
-        f"push of {push.torque_n_m:+g} N m{_about(push.axis)} for {push.duration_s:g} s at {push.start_s:g} s"
-        for push in header.pushes
-    ]
-    for swing in header.swings:
-        end = "to the end" if swing.duration_s is None else f"for {swing.duration_s:g} s"
-        sine = f"{swing.amplitude_n_m:g} N m{_about(swing.axis)} at {swing.frequency_hz:g} Hz"
-        torques.append(f"swing of {sine} from {swing.start_s:g} s {end}")
+    torques = [f"push of {push.words}" for push in header.pushes]
+    torques += [f"swing of {swing.words}" for swing in header.swings]
     return _paragraphs(
         f"# {header.title or 'Run'}",
         *parts,
@@ -238,10 +232,6 @@ def _summary_page(header: RecordingHeader, branches: Sequence[Branch]) -> str:
         *(f"**{run.name}**: {run.outcome.reason}" for run in runs if run.outcome.reason),
         NOTES,
     )
-
-
-def _about(axis: str | None) -> str:
-    return f" about {axis}" if axis else ""
 
 
 def _estimates(branch: Branch, alone: bool) -> list[str]:

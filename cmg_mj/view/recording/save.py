@@ -20,7 +20,7 @@ import rerun.blueprint as rrb
 from cmg_mj.core.errors import InputError
 from cmg_mj.results.folder import whole_file
 from cmg_mj.scenario.resolve import versions
-from cmg_mj.view.recording.layout import Plot, default_blueprint, page_tabs, pages, plot_view, tabbed_blueprint
+from cmg_mj.view.recording.layout import Plot, default_blueprint, page_tabs, pages, plot_view, rows_of, tabbed_blueprint
 from cmg_mj.view.recording.run import RecordingHeader, Run, numbered_parts
 from cmg_mj.view.recording.scene import log_poses, log_pushes, log_shapes
 from cmg_mj.view.recording.signals import Lines, Series, log_phases, log_styles, log_values, make_branches
@@ -114,7 +114,7 @@ def write_logs(path: Path, title: str, logs: Sequence[LogSeries], texts: Mapping
 
 def _log_board(branch: Lines, log: LogSeries, titles: Sequence[str]) -> rrb.Container:
     """Lay out everything about one log."""
-    plots = [plot for plot in LOG_PLOTS if any(path.startswith(plot.entities) for path in branch.series)]
+    plots = [plot for plot in LOG_PLOTS if rows_of(plot, branch)]
     left, right = (
         [plot_view(plot, branch, log.best) for plot in plots if (plot in MAIN) == is_left] for is_left in (True, False)
     )

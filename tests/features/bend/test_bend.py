@@ -212,8 +212,6 @@ HINGE_TORQUES: dict[str, tuple[str, Any, str | None]] = {
     "damping": ("damping", [0.1, 0.0, 0.0], "tilt_damping_n_m_s"),
     "frictionloss": ("frictionloss", 0.1, "tilt_friction_n_m"),
     "stiffness": ("stiffness", [0.1, 0.0, 0.0], None),
-    "armature": ("armature", 0.1, None),
-    "nonlinear damping": ("damping", [0.0, 0.1, 0.0], None),
 }
 
 

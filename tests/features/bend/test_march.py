@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
-from cmg_mj.laws.state_feedback import StateFeedback
 from cmg_mj.linear.march import march
 from cmg_mj.linear.plant import linearise
 from cmg_mj.runs.experiment import Experiment
@@ -32,27 +29,6 @@ def decay_of(*settings: str, scenario: str = "push_recovery") -> Decay:
 
 def test_a_rig_without_gains_falls() -> None:
     assert decay_of("bend.frequency_hz=20", "controller.gains=[0, 0, 0, 0]") == ("falls", "falls")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("hz", [3.0, 3.5, 4.0, 4.5, 5.0, 8.0])
-@pytest.mark.parametrize("gain", [1.0, 0.3])
-def test_with_the_true_rate_it_is_the_spectral_radius(hz: float, gain: float) -> None:
-    """One sample of the linear closed loop as a matrix, of the plant and the integrator."""
-    gains = [gain * k for k in (35.0, 4.0, -1.0, 0.3)]
-    settings = [f"bend.frequency_hz={hz}", "controller.feedback=truth", f"controller.gains={gains}"]
-    subject = experiment(*settings)
-    bend, law = linearise(subject.plant), subject.law
-    assert isinstance(law, StateFeedback)
-    F, G = bend.hold(law.dt)
-    C, n = bend.C[[3, 1, 2]], len(F)
-    closed = np.zeros((n + 1, n + 1))
-    command = -np.append(np.array(law.gains[:3]) @ C, law.gains[3])
-    closed[:n, :n], closed[n, :n], closed[n, n] = F, -law.dt * C[2], 1.0
-    closed[:n] += G[:, :1] @ command[None]
-    growth = math.log(np.abs(np.linalg.eigvals(closed)).max()) / law.dt
-    # The wheels' own angles and speeds neither grow nor decay.
-    assert (decay_of(*settings).bending in ("swings", "falls")) == (growth > 1e-3)
 
 
 GYRO_FREE, SLOW = ["observer.kind=gyro_free"], ["observer.kind=linear", "observer.tau=0.3"]

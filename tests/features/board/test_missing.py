@@ -25,9 +25,7 @@ def install(folder: Path, *programs: str) -> None:
     ("programs_there", "packages"),
     [
         ((), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"),
-        ((EMULATOR,), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
         ((COMPILER, SIZE, EMULATOR), "libnewlib-arm-none-eabi"),
-        ((SIZE, EMULATOR), "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
     ],
 )
 def test_it_is_said_what_to_install(

@@ -94,11 +94,6 @@ class TakesModulo(Tilts):
         return y.y1 % 1.0  # here
 
 
-class TakesANorm(Tilts):
-    def tilt(self, y: Measurement) -> Any:
-        return np.linalg.norm(y.y1)  # here
-
-
 class FillsAnArray(Tilts):
     def tilt(self, y: Measurement) -> Any:
         x = np.zeros(2)
@@ -106,23 +101,11 @@ class FillsAnArray(Tilts):
         return x[0]
 
 
-class IsComplex(Tilts):
-    def tilt(self, y: Measurement) -> Any:
-        return abs(y.y1 + 1j * y.y2)  # here
-
-
 class Raises(Tilts):
     def tilt(self, y: Measurement) -> Any:
         if type(y.y1) is not float:
             raise KeyError("floats only")  # here
         return y.y1
-
-
-class Exits(Plain):
-    def init(self, y: Measurement) -> Any:
-        if type(y.y1) is not float:
-            raise SystemExit(3)  # here
-        return super().init(y)
 
 
 class LooksAtTypes(Plain):
@@ -169,13 +152,6 @@ class HoldsADeque(Tilts):
         return deque([y.y1])
 
 
-class HoldsItself(Tilts):
-    def init(self, y: Measurement) -> Any:
-        state: list[Any] = [y.y1]
-        state.append(state)
-        return state
-
-
 class HoldsTooMuch(Tilts):
     def init(self, y: Measurement) -> Any:
         return np.zeros((40, 40)) + y.y1
@@ -206,8 +182,3 @@ class Stateless(Plain):
 
     def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
         return (), (y.y1, 0.01 * y.acceleration, y.y2)
-
-
-class Uncopied(Plain):
-    def __deepcopy__(self, memo: Any) -> Any:
-        raise RuntimeError("there is only one of me")

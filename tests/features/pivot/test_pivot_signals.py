@@ -13,7 +13,6 @@ from cmg_mj.core.noise import NoiseStream
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_signals import BandLimitedNoise, PivotSignals, pivot_signal
 from cmg_mj.features.pivot.pivot_track import read_track
-from cmg_mj.scenario.loading import load_scenario
 
 H = 0.005
 STREAM = NoiseStream.PIVOT
@@ -121,17 +120,12 @@ def test_going_back_in_time_gives_the_same_noise() -> None:
     [
         ("", None, "Empty CSV file"),
         ("0.0,1.0\n1.0,2.0\n", None, "line 1: must be a heading"),
-        ("time_s\n0\n1\n", None, "line 1: must be a heading of at least two"),
         ("t,a,b\n0,1,2\n1,1,2\n", None, "has the columns 'a, b'; name that of the acceleration with column"),
         ("t,a,b\n0,1,2\n1,1,2\n", "bb", "no column 'bb'; did you mean 'b'"),
         ("t,a\n0,1\n", None, "too few samples (1); a track has at least two"),
         ("t,a\n0,1\n\n1,x\n", None, "column 'a': must hold numbers alone"),
         ("t,a\n0,1\n1,nan\n", None, "sample 2: nan m/s2 at 1 s: must be finite"),
-        ("t,a\n0,1\n1e308,2\n", None, "sample 2: 2 m/s2 at 1e+308 s: must be finite"),
-        ("t,a\n-1.7e308,1\n1.7e308,2\n", None, "sample 1: 1 m/s2 at -1.7e+308 s: must be finite"),
         ("t,a\n0,1\n1\n", None, "Expected 2 columns, got 1"),
-        ("t,a\n0,1\n1,2,5\n", None, "Expected 2 columns, got 3"),
-        ("t,a\n0,true\n1,false\n", None, "column 'a': must hold numbers alone"),
         ("t,a\n0,1\n0,2\n", None, "sample 2: the time 0 s does not follow 0 s"),
         (
             "t,a\n0,1\n1,9810\n",
@@ -162,14 +156,3 @@ def test_a_track_that_changes_is_read_anew(tmp_path: Path) -> None:
     assert read_track(str(path), None).velocity(1.0) == 1.0
     path.write_text("t,a\n0,10\n1,10\n", encoding="utf-8")
     assert read_track(str(path), None).velocity(1.0) == 10.0
-
-
-def test_a_scenario_file_names_its_track_from_where_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "track.csv").write_text("t,a\n0,1\n1,1\n", encoding="utf-8")
-    scenario = tmp_path / "there" / "mine.toml"
-    scenario.write_text('[[pivot]]\nkind = "track"\nfile = "track.csv"\n', encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    (pivot,) = load_scenario(str(scenario)).section("pivot")
-    assert pivot.file == str(tmp_path / "there" / "track.csv")
-    assert pivot.words == f"track, {pivot.file}, times 1, across, from 0 s"

@@ -342,7 +342,6 @@ def test_accelerometers_in_a_wrong_unit(swing: float, tmp_path: Path) -> None:
 
 SIGNS = [
     (["# {}"], ""),
-    (["%{}", "% units: s, rad"], ""),
     (["# Run 5, by me", "", "// {}"], ""),
     (["# Run 5, with care", "{}"], ""),
     (["#,{}"], "1,"),
@@ -359,7 +358,7 @@ def test_a_heading_behind_a_comment_sign(beginning: list[str], before: str, tmp_
 
 @pytest.mark.parametrize(
     "stamp",
-    ["{}Z", "{}+0000", "{}000000000 +02:00", "{}-05", "{} UTC"],
+    ["{}Z", "{}000000000 +02:00", "{} UTC"],
 )
 def test_dates_with_a_zone(stamp: str, tmp_path: Path) -> None:
     """Zones change, and the fraction is left out where it is zero."""
@@ -376,26 +375,24 @@ def test_dates_with_a_zone(stamp: str, tmp_path: Path) -> None:
 
 PACKET_STAMPS = {
     "two": lambda i: i // 2 * 0.01 + i % 2 * 0.0002,
-    "three": lambda i: i // 3 * 0.015 + i % 3 * 0.001,
     "five with jitter": lambda i: i // 5 * 0.025 + i % 5 * 0.0002 + np.sin(i // 5) * 0.004,
-    "hundred": lambda i: i // 100 * 0.5 + i % 100 * 1e-4,
     "stamped once": lambda i: i // 4 * 0.02,
     "a pause": lambda i: i // 3 * 0.015 + i % 3 * 2e-4 + (i > 1500) * 9.0,
 }
 
 
 @pytest.mark.parametrize("kind", PACKET_STAMPS)
-@pytest.mark.parametrize("rows", [slice(None), slice(1, -1), slice(2, -1)])
+@pytest.mark.parametrize("rows", [slice(None), slice(1, -1)])
 def test_packets_are_refused_with_the_cure(kind: str, rows: slice, tmp_path: Path) -> None:
     columns = {**sine(), "t_s": PACKET_STAMPS[kind](np.arange(N))}
-    for options in ({}, {"max_gap_s": 0.5}):
+    for max_gap_s in (None, 0.5):
         with pytest.raises(InputError, match=r"leave time out and give --rate (\d+\.?\d*)$") as info:
-            read(tmp_path, {name: values[rows] for name, values in columns.items()}, **options)
+            read(tmp_path, {name: values[rows] for name, values in columns.items()}, max_gap_s=max_gap_s)
         assert float(str(info.value).split()[-1]) == pytest.approx(200.0, rel=0.005)
 
 
-@pytest.mark.parametrize("rows", [slice(None), slice(1, -1), slice(1, None)])
-@pytest.mark.parametrize("steps", [(4, 16), (7, 13), (7, 7, 16)])
+@pytest.mark.parametrize("rows", [slice(None), slice(1, -1)])
+@pytest.mark.parametrize("steps", [(4, 16), (7, 7, 16)])
 def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: slice, tmp_path: Path) -> None:
     t = 1e-3 * np.concatenate([[0.0], np.cumsum(np.resize(steps, 3000))])[rows]
     log = read(tmp_path, sine(t))
@@ -405,7 +402,7 @@ def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: sli
     assert np.isfinite(log["reference_rad_s"]).mean() > 0.99
 
 
-@pytest.mark.parametrize("lost", [0.02, 0.1, 0.18])
+@pytest.mark.parametrize("lost", [0.02, 0.18])
 def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) -> None:
     kept = np.random.default_rng(2).uniform(size=N) > lost
     log = read(tmp_path, {name: values[kept] for name, values in sine().items()})
@@ -429,8 +426,8 @@ def test_what_is_clipped_is_named_and_not_compared(place: str, ending: str, tmp_
     np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), clipped)
 
 
-@pytest.mark.parametrize("step", [0.001, 0.02, 0.1])
-@pytest.mark.parametrize("noise", [0.0, 0.3, 1.5])
+@pytest.mark.parametrize("step", [0.001, 0.1])
+@pytest.mark.parametrize("noise", [0.0, 1.5])
 def test_a_quantiser_is_not_clipped(step: float, noise: float, tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     for size, name in ((1.0, "tilt_rad"), (5.0, "gyro_rad_s")):

@@ -180,12 +180,6 @@ def test_a_worker_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("dry", [[], ["--dry-run"]])
-def test_an_address_that_is_none_is_refused(tmp_path: Path, dry: list[str]) -> None:
-    outcome = cmg_mj(*SWEEP, "--out", str(tmp_path / "out"), "--cluster", "nonsense", *dry)
-    assert outcome.complaint.startswith("--cluster nonsense: write tcp://HOST:PORT")
-
-
-@pytest.mark.parametrize("dry", [[], ["--dry-run"]])
 def test_without_distributed_it_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dry: list[str]) -> None:
     monkeypatch.setattr("cmg_mj.features.sweeps.cluster.find_spec", lambda name: None)
     outcome = cmg_mj(*SWEEP, "--out", str(tmp_path / "out"), "--cluster", DEAD_ADDRESS, *dry)

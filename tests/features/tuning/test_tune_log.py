@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.features.replay.log import ReadOptions
 from cmg_mj.features.replay.log_replay import replay_prepared
-from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import tune_on_logs
 from tests.command import cmg_mj
@@ -80,18 +78,6 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
     stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_every_log_is_tuned_with_its_own_noise(run: Path) -> None:
-    run_log = read_log(run)
-    plain = read_log(run, ReadOptions({"time": "time_s", "tilt": "y1_rad", "rate": "x2_rad_s"}))
-    settings = {"settle_s": 0.2, "parameters": ["tau"], "ranges": {"tau": (0.01, 0.05)}}
-    run_noise, plain_noise = (log.noise for log in tune_on_logs([run_log, plain], "linear", **settings).logs)
-    assert run_noise == prepare(load_scenario("push_recovery", SETTINGS)).design.constructor_arguments[2]
-    assert plain_noise == noise_of(plain) != run_noise
-    for log in tune_on_logs([run_log, plain], "linear", noises={"tilt": 0.7}, **settings).logs:
-        assert np.degrees(log.noise.tilt) == pytest.approx(0.7)
 
 
 def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:

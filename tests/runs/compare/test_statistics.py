@@ -161,17 +161,6 @@ def compare_two() -> tuple[ComparedObserver, ...]:
     return tuple(compare(prepare_comparison(scenario, ["ltv", "luenberger"]), 3))
 
 
-def test_the_table_has_every_world_of_every_row() -> None:
-    table = worlds_table(compare_two())
-    assert table.num_rows == (2 + len(BASELINES)) * 3
-    assert table["observer"].to_pylist() == [n for n in ("ltv", "luenberger", *BASELINES) for _ in range(3)]
-    assert table["world"].to_pylist() == [0, 1, 2] * (2 + len(BASELINES))
-    assert set(table["seed"].to_pylist()) == {3}
-    assert table["outcome"].to_pylist() == ["done"] * 3 + ["fell"] * 3 + ["done"] * 3 * len(BASELINES)
-    assert table["in_loop_of"].to_pylist() == [None] * 6 + ["ltv"] * 3 * len(BASELINES)
-    assert set(compare_two()[0].result.summaries[0]) - {"references", "open_loop_observers"} <= set(table.column_names)
-
-
 def test_what_stood_averages_to_what_is_printed() -> None:
     """And the figures of those that fell are there, marked."""
     table = worlds_table(compare_two())

@@ -110,19 +110,6 @@ def test_a_swing_is_not_called_a_push(few: Trajectory, tmp_path: Path, figures: 
     assert len(tilt.patches) == 2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("ticks", [0, 1, 2])
-def test_a_run_of_no_length(
-    all_observers: tuple[Trajectory, dict[str, Any]],
-    tmp_path: Path,
-    figures: list[matplotlib.figure.Figure],
-    ticks: int,
-) -> None:
-    trajectory, _ = all_observers
-    columns = {name: values[:ticks] for name, values in trajectory.columns.items()}
-    plot(tmp_path, replace(trajectory, columns=columns), {}, figures)
-
-
 def test_a_diverged_estimate_is_drawn_without_a_warning(few: Trajectory, tmp_path: Path, figures: list[Any]) -> None:
     estimate = few["x2_rad_s"].copy()
     estimate[50:] = [*[1e300, -np.inf], *[np.nan] * (len(few) - 52)]

@@ -111,7 +111,7 @@ def test_the_best_runs_are_on(all_observers: tuple[Experiment, Run], tmp_path: P
         experiment.plant, 4.7, swings=[Swing(1.5, 0.3), Swing(2.0, 0.1, start_s=1.0, duration_s=2.0)]
     )
     text = pages(header, make_branches(header, runs))["summary"]
-    assert "0.1 N m at 2 Hz from 1 s for 2 s" in text
+    assert "0.1 N m at 2 Hz from 1 s to 3 s" in text
     assert [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")][1:5] == [
         *("**b**", "**a**", "**d**", "c")
     ]

@@ -6,7 +6,6 @@ import os
 import resource
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -279,19 +278,6 @@ def test_phases(run: Run, pushes: list[Push], expected: list[tuple[float, str]])
     actual = phases(run, pushes, MetricsSettings())
     assert [name for _, name in actual] == [name for _, name in expected]
     assert [time for time, _ in actual] == pytest.approx([time for time, _ in expected])
-
-
-@pytest.mark.parametrize("ticks", [0, 2])
-def test_a_run_of_no_length(run: Run, experiment: Experiment, tmp_path: Path, ticks: int) -> None:
-    short = replace(run.trajectory, columns={name: values[:ticks] for name, values in run.trajectory.columns.items()})
-    end = ticks * experiment.law.dt
-    short_run = replace(run, trajectory=short, summary={"settle_time_s": None}, outcome=Outcome("fell", end))
-    path = write(tmp_path / "short.rrd", experiment, [short_run])
-    assert rerun(tmp_path, "verify", path).returncode == 0
-    times, _ = column(path, "/homogeneous/rig/frame", "Transform3D:translation")
-    assert len(times) == (1 if ticks < 2 else 2)
-    _, states = column(path, "/homogeneous/phase", "StateChange:state")
-    assert "fallen" in [state for (state,) in states]
 
 
 def test_two_observers_have_a_branch_each(run: Run, experiment: Experiment, tmp_path: Path) -> None:
