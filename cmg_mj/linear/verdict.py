@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -214,20 +215,24 @@ def hints(design: Design, plant: Plant) -> list[str]:
     # Margin that a notch against a bend takes is no fault.
     is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
-    others = _ceiling_hint(design), fault, _sliding_hint(scenario, law, plant)
+    others = *_ceiling_hints(design), fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
 
 
-def _ceiling_hint(design: Design) -> str | None:
-    """Clause for a first tilt from which no controller recovers."""
-    start = design.scenario.plant.initial_tilt_deg
-    most = math.degrees(ceiling(design.rig.reduced, design.law.rate_limit).tilt)
-    if abs(start) <= most:
-        return None
-    return (
-        f"plant.initial_tilt_deg = {start:g}: no controller recovers from more than {most:.3g} deg on this plant; a "
-        "larger pair or a lighter plant does"
-    )
+def _ceiling_hints(design: Design) -> Iterator[str]:
+    """Write clauses for a first tilt and for pushes from which no controller recovers."""
+    limit = ceiling(design.rig.reduced, design.law.rate_limit)
+    start, most = design.scenario.plant.initial_tilt_deg, math.degrees(limit.tilt)
+    sizes = [("plant.initial_tilt_deg", start, most, "deg")]
+    for i, push in enumerate(design.scenario.push):
+        most = limit.push_impulse(push.duration_s) / push.duration_s
+        sizes.append((f"push.{i}.torque_n_m", push.torque_n_m, most, "N m"))
+    for field, value, most, unit in sizes:
+        if abs(value) > most:
+            yield (
+                f"{field} = {value:g}: no controller recovers from more than {most:.3g} {unit} on this plant; a larger "
+                "pair or a lighter plant does"
+            )
 
 
 STANDS_STILL = 1e-6

@@ -91,7 +91,8 @@ class Claim:
             return "not reproduced"
         if self.is_general:
             return "illustrated"
-        return "reproduced within stated conditions" if self.assumes or self.conditions else "reproduced"
+        whole = all(self.measures.values()) and not (self.assumes or self.conditions)
+        return "reproduced" if whole else "reproduced within stated conditions"
 
     @property
     def reason(self) -> str:

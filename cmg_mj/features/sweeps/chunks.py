@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -356,7 +357,7 @@ def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
 
 
 def hash_of(study: SweepStudy, fields: StudyFields) -> str:
-    """Hash everything that a chunk's figures depend on.
+    """Hash everything that a chunk's figures depend on, the files of a user's observers and law among it.
 
     Args:
         study: The sweep.
@@ -370,6 +371,9 @@ def hash_of(study: SweepStudy, fields: StudyFields) -> str:
     tracks = [file for parts in study.scenario.feature_sections.values() for part in parts for file in part.files]
     tracks += [file for axis in study.axes for file in varied_tracks(axis)]
     files = [find("models", model, ".xml", "plant.model =") for model in models or [study.scenario.plant.model]]
+    kinds = (str(kind).partition(":") for kind in (*study.observers, study.scenario.controller.kind))
+    own = (find_spec(module) for module, colon, _ in kinds if colon)
+    tracks += [spec.origin for spec in own if spec and spec.origin]
     for path in [*itertools.chain.from_iterable(map(model_files, files)), *map(Path, tracks)]:
         try:
             content = path.read_bytes()
