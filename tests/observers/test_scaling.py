@@ -32,7 +32,10 @@ STAY: dict[str, dict[str, Unit]] = {
         **_PIVOT_FREE,
         **_TIMES,
         "pivot_hz": Unit(-1),
-        **dict.fromkeys(("pivot_start", "pivot_floor", "innovation_weight", "rise_factor", "covariance_boost", "inflation", "gate"), PURE),
+        **dict.fromkeys(
+            ("pivot_start", "pivot_floor", "innovation_weight", "rise_factor", "covariance_boost", "inflation", "gate"),
+            PURE,
+        ),
     },
     "super_twisting": {"l0": PURE, "l1": PURE},
     "linear_high_gain": {"a1": PURE, "a2": PURE},
