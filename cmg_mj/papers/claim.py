@@ -91,8 +91,8 @@ class Claim:
             return "not reproduced"
         if self.is_general:
             return "illustrated"
-        whole = all(self.measures.values()) and not (self.assumes or self.conditions)
-        return "reproduced" if whole else "reproduced within stated conditions"
+        ours = self.assumes or self.conditions or self.one_suffices
+        return "reproduced within stated conditions" if ours else "reproduced"
 
     @property
     def reason(self) -> str:
