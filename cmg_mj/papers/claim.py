@@ -91,8 +91,9 @@ class Claim:
             return "not reproduced"
         if self.is_general:
             return "illustrated"
-        ours = self.assumes or self.conditions or self.one_suffices
-        return "reproduced within stated conditions" if ours else "reproduced"
+        if self.assumes or self.conditions or self.one_suffices:
+            return "reproduced within stated conditions"
+        return "reproduced"
 
     @property
     def reason(self) -> str:

@@ -59,7 +59,7 @@ def level(noise: float, ratio: float, zero: float = 0.1, scatter: float = 1.0) -
     """Table 2's error by the tuned's is the ratio, beyond chance if its scatter is small."""
     rms = np.full(4, 0.05)
     return NoiseLevelResult(
-        noise, {}, {"tau": 0.02}, [], 0.05, ratio * 0.05, rms, ratio * rms + scatter * WAVE, zero, 0.0, 0
+        noise, {}, {"tau": 0.02}, [], 0.05, ratio * 0.05, rms, ratio * rms + scatter * WAVE, zero, 0
     )
 
 

@@ -17,7 +17,7 @@ def level(printed: Sequence[float], tuned: Sequence[float]) -> NoiseLevelResult:
     """With these errors on the held-out worlds."""
     rms, printed_rms = np.array(tuned), np.array(printed)
     return NoiseLevelResult(
-        400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(printed_rms.mean()), rms, printed_rms, 1.0, 1.0, 0
+        400.0, {}, {"tau": 0.02}, (), float(rms.mean()), float(printed_rms.mean()), rms, printed_rms, 1.0, 0
     )
 
 
