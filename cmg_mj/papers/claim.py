@@ -91,9 +91,7 @@ class Claim:
             return "not reproduced"
         if self.is_general:
             return "illustrated"
-        if self.assumes or self.conditions or self.one_suffices:
-            return "reproduced within stated conditions"
-        return "reproduced"
+        return "reproduced within stated conditions" if self.assumes or self.conditions or self.one_suffices else "reproduced"
 
     @property
     def reason(self) -> str:
