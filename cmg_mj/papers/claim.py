@@ -91,7 +91,9 @@ class Claim:
             return "not reproduced"
         if self.is_general:
             return "illustrated"
-        return "reproduced within stated conditions" if self.assumes or self.conditions or self.one_suffices else "reproduced"
+        if self.assumes or self.conditions or self.one_suffices:
+            return "reproduced within stated conditions"
+        return "reproduced"
 
     @property
     def reason(self) -> str:
