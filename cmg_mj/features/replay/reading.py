@@ -43,6 +43,8 @@ LOST = 1.25
 """Mean step, in periods, up to which single rows are lost."""
 PAUSE = 3.0
 """Longer steps, in usual ones between packets, are pauses."""
+ALIKE = 1.5
+"""Mean change of a signal and its slope across long steps, in that across short ones, up to which rows are even."""
 MIN_SAMPLES = 20
 """A segment with fewer samples is discarded."""
 BRIDGED = 5
@@ -224,7 +226,8 @@ def _times(
 def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
     """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
 
-    A signal that comes to its end quickly, stays, and leaves quickly is clipped. A quantised one turns in few steps.
+    A signal that comes to its end quickly, stays there for longer than elsewhere, and leaves quickly is clipped. A
+    quantised one turns in few steps.
     """
     clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
     rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
@@ -232,13 +235,14 @@ def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[st
         if role == "command" or role.startswith("gimbal"):
             continue  # which stand at their ends by right
         (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
+        usual = np.median(np.diff(np.flatnonzero(np.diff(values, prepend=math.nan, append=math.nan))))
         steep = STEEP * smallest_step(values[np.isfinite(values)])
         for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
             n_rows, at_end = 0, values == end
             for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
                 fall = np.fmin.reduce(np.abs(around[[start, stop + 3]] - end))
                 rests = role == "tilt" and np.median(rate[start:stop]) < REST * np.fmax.reduce(rate)
-                if stop - start > 2 and fall * min(stop - start, 10) > steep and not rests:
+                if stop - start > 2.0 * usual and fall * min(stop - start, 10) > steep and not rests:
                     n_rows += stop - start
             if n_rows >= CLIPPED:
                 clipped |= at_end
@@ -301,7 +305,7 @@ def _sample(
     """
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
-    period, between = _pace(steps)
+    period, between = _pace(steps, np.diff(values["y1_rad"]))
     gap = GAP_PERIODS * period
     cure = f"leave time out and give --rate {1.0 / period:.4g}"
     if between > PACKET * period:
@@ -359,11 +363,12 @@ def _sample(
     return period, dt, segments
 
 
-def _pace(steps: np.ndarray) -> tuple[float, float]:
+def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
     """Return the period of rows, and the usual step between packets of them, or 0 [s].
 
-    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost. Otherwise long
-    and short steps take turns, and the period is their mean, from the first packet to the last.
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost; or if they are
+    pauses, across which the signal changes by more. Otherwise long and short steps take turns, and the period is their
+    mean, from the first packet to the last.
     """
     period = float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
     longer = steps > GAP_PERIODS * period
@@ -372,7 +377,9 @@ def _pace(steps: np.ndarray) -> tuple[float, float]:
         first, *_, last = np.flatnonzero(longer) + 1
         whole = steps[first:last]
         mean = float(whole[whole < PAUSE * between].mean())
-        if mean > LOST * period or longer.mean() > LOST - 1.0:
+        sizes = np.abs(changes) + np.abs(np.gradient(changes))
+        pauses = between > PACKET * mean and sizes[longer].mean() > ALIKE * sizes[~longer].mean()
+        if not pauses and (mean > LOST * period or longer.mean() > LOST - 1.0):
             return mean, between
     return period, 0.0
 
@@ -493,7 +500,7 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
     sampled = []
     for segment in segments:
         grid, stamps = segment.time, segment.when(time) - delay_s
-        period, between = _pace(np.diff(stamps))
+        period, between = _pace(np.diff(stamps), np.diff(reference))
         gap = (2.0 if between else GAP_PERIODS) * period
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)

@@ -391,6 +391,17 @@ def test_packets_are_refused_with_the_cure(kind: str, rows: slice, tmp_path: Pat
         assert float(str(info.value).split()[-1]) == pytest.approx(200.0, rel=0.005)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize(("kept", "of", "parts"), [(140, 200, 20), (100, 200, 20), (32, 50, 80), (38, 80, 50)])
+def test_pauses_are_no_packets(kept: int, of: int, parts: int, noise: float, tmp_path: Path) -> None:
+    """A pause of half a period too, across which the tilt changes by nothing."""
+    columns = sine()
+    columns["tilt_rad"] += noise * np.random.default_rng(5).standard_normal(N)
+    log = read(tmp_path, {name: values[np.arange(N) % of < kept] for name, values in columns.items()})
+    assert (log.dt, len(log.parts)) == (DT, parts)
+    assert_sine(log, 6.0 * noise + 1e-9)
+
+
 @pytest.mark.parametrize("rows", [slice(None), slice(1, -1)])
 @pytest.mark.parametrize("steps", [(4, 16), (7, 7, 16)])
 def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: slice, tmp_path: Path) -> None:
@@ -434,6 +445,15 @@ def test_a_quantiser_is_not_clipped(step: float, noise: float, tmp_path: Path) -
         columns, q = sine(), step * size
         columns[name] = q * np.round(columns[name] / q + noise * random.standard_normal(N))
         assert not any("clipped" in note for note in read(tmp_path, columns).notes)
+
+
+@pytest.mark.parametrize("place", ["tilt_rad", "gyro_rad_s"])
+def test_a_signal_that_is_held_is_clipped_where_it_is(place: str, tmp_path: Path) -> None:
+    columns = sine()
+    columns[place] = (columns[place] + 1e-3 * np.random.default_rng(6).standard_normal(N))[np.arange(N) // 5 * 5]
+    assert read(tmp_path, columns).notes == ()
+    columns[place] = np.minimum(columns[place], 0.8 * columns[place].max())
+    assert f"rows of '{place}' stand" in read(tmp_path, columns).notes[0]
 
 
 def test_a_tilt_at_rest_is_not_clipped(tmp_path: Path) -> None:
