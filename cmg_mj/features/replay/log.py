@@ -423,10 +423,8 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     if "\0".encode(options.encoding) == b"\0":
         at = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ).find(b"\0")
         if at >= 0:
-            raise InputError(
-                f"{path}: byte {at:,} is NUL, as where a power cut ended a file; delete such bytes, as with "
-                "tr -d '\\0' < LOG > CLEAN"
-            )
+            where = "where a power cut ended a file; delete such bytes, as with tr -d '\\0' < LOG > CLEAN"
+            raise InputError(f"{path}: byte {at:,} is NUL, as {'in UTF-16: --encoding utf-16' if at < 4 else where}")
     beginning: list[str] = []
     with path.open(encoding=options.encoding, errors="replace") as lines:
         for line in lines:
@@ -442,8 +440,10 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
             found = len(wanted.intersection(cells)) - "".join(cells).startswith(tuple("+-.0123456789"))
             if cells and found > most:
                 most, names, n_skipped = found, cells, max(number + 1, last + (number == last))
+    if not wanted <= set(names) and "\ufffd" in "".join(names):
+        raise ValueError(f"its heading is not {options.encoding}")
     read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False, column_names=names, skip_rows=n_skipped)
-    parse = pacsv.ParseOptions(delimiter=options.delimiter)
+    parse = pacsv.ParseOptions(delimiter=options.delimiter, newlines_in_values=True)
     kinds = dict.fromkeys(names, pa.binary())
     kinds |= dict.fromkeys(wanted, pa.float64())
     convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds, strings_can_be_null=True)
@@ -456,11 +456,16 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
         convert.column_types = kinds | {columns["time"].name.strip(): pa.string()}  # its stamps may be dates
         table = pacsv.read_csv(file, read, parse, convert)
     for name, cells in zip(names, table.columns, strict=True):
-        if not pa.types.is_floating(cells.type) and (n_lines := pc.sum(pc.count_substring(cells, "\n")).as_py()):
-            row = pc.index(pc.match_substring(cells, "\n"), True).as_py()
+        if pa.types.is_floating(cells.type):
+            continue
+        counts = (np.array(pc.fill_null(pc.count_substring(cells, sign), 0), int) for sign in ("\n", options.delimiter))
+        n_lines, n_delimiters = counts
+        n_lines[-1:] -= 1  # a quote that nothing ends takes the last line's end too
+        rows = np.flatnonzero((n_lines > 0) & (n_delimiters >= n_lines * (len(names) - 1)))  # text has fewer than rows
+        if len(rows):
             raise InputError(
-                f"{path}: a quote in column {name!r}, about line {n_skipped + row + 1}, ends {n_lines:,} lines later, "
-                "which are lost: delete the quotes"
+                f"{path}: a quote in column {name!r}, about line {n_skipped + rows[0] + 1}, ends "
+                f"{n_lines[rows[0]]:,} lines later, which are lost: delete the quotes"
             )
     return table
 

@@ -469,16 +469,34 @@ def test_nul_bytes_are_named(at: int, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", sine())
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[: at + 1]) + bytes(40) + b"".join(lines[at + 1 :]))
-    with pytest.raises(InputError, match=f"byte {len(b''.join(lines[: at + 1])):,} is NUL"):
+    with pytest.raises(InputError, match=f"byte {len(b''.join(lines[: at + 1])):,} is NUL.* power cut"):
         read_log(path, ReadOptions(COLUMNS))
 
 
-def test_a_quote_that_swallows_rows_is_named(tmp_path: Path) -> None:
-    note = ["ok"] * N
-    note[100], note[295] = '"oops', 'x"'
+@pytest.mark.parametrize(
+    ("encoding", "cure"),
+    [("utf-16", "--encoding utf-16$"), ("utf-16-be", "--encoding utf-16$"), ("latin-1", "not utf-8.*--encoding")],
+)
+def test_another_encoding_is_named(encoding: str, cure: str, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", {"t_s": T, "Neigung_°": tilt(T)})
+    path.write_bytes(path.read_text("utf-8").encode(encoding))
+    options = ReadOptions({**ONE, "tilt": "Neigung_°"})
+    with pytest.raises(InputError, match=cure):
+        read_log(path, options)
+    assert len(read_log(path, dataclasses.replace(options, encoding=encoding))) == N
+
+
+@pytest.mark.parametrize(("end", "n_lines"), [(295, 195), (101, 1), (N, N - 101)])
+def test_a_quote_that_swallows_rows_is_named(end: int, n_lines: int, tmp_path: Path) -> None:
+    note = ["ok"] * N + ['x"']
+    note[100], note[end] = '"oops', 'x"'
     for name in ("note", "t_s2"):
-        with pytest.raises(InputError, match=f"a quote in column '{name}', about line 102, ends 195 lines later"):
-            read(tmp_path, {**sine(), name: note})
+        with pytest.raises(InputError, match=f"column '{name}', about line 102, ends {n_lines:,} lines later"):
+            read(tmp_path, {**sine(), name: note[:N]})
+
+
+def test_text_of_two_lines_is_none(tmp_path: Path) -> None:
+    assert_plain(read(tmp_path, {"note": ['"a, ""b""\nand c"', "ok"] * (N // 2), **sine()}))
 
 
 @pytest.mark.parametrize(("place", "size"), [("tilt_rad", 1e308), ("gyro_rad_s", 1e200), ("t_s", 3e307)])
