@@ -406,6 +406,9 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
+            beyond = np.abs(floats) > LARGEST
+            if 2 * len(np.unique(floats[beyond])) > len(floats):
+                raise InputError(f"{path}: column {name!r}: {beyond.sum():,} numbers are beyond {LARGEST:g}: its unit?")
             values[role] = np.where(np.abs(floats) <= LARGEST, floats, np.nan) * factor + offset
     return values
 

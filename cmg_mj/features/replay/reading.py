@@ -41,6 +41,8 @@ PACKET = 1.75
 """Rows with longer usual steps between them, in their mean, come in packets: what is between is not known."""
 LOST = 1.25
 """Mean step, in periods, up to which single rows are lost."""
+TIGHT = 0.2
+"""A spline through rows that are less than so many periods apart swings far beyond them."""
 PAUSE = 3.0
 """Longer steps, in usual ones between packets, are pauses."""
 ALIKE = 1.5
@@ -334,7 +336,8 @@ def _sample(
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
         own = f"; if they were measured evenly, {cure}" if between else ""
-        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines{own}")
+        lines = "straight lines" if steps.min() < TIGHT * period else "cubic splines"
+        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by {lines}{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
         notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
     for what, which in (
@@ -366,7 +369,8 @@ def _sample(
 def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
     """Return the period of rows, and the usual step between packets of them, or 0 [s].
 
-    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost; or if they are
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost, and none much
+    shorter; or if they are
     pauses, across which the signal changes by more. Otherwise long and short steps take turns, and the period is their
     mean, from the first packet to the last.
     """
@@ -379,7 +383,8 @@ def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
         mean = float(whole[whole < PAUSE * between].mean())
         sizes = np.abs(changes) + np.abs(np.gradient(changes))
         pauses = between > PACKET * mean and sizes[longer].mean() > ALIKE * sizes[~longer].mean()
-        if not pauses and (mean > LOST * period or longer.mean() > LOST - 1.0):
+        uneven = np.quantile(steps, 0.1) < 0.75 * period
+        if not pauses and (uneven or mean > LOST * period or longer.mean() > LOST - 1.0):
             return mean, between
     return period, 0.0
 
@@ -437,9 +442,14 @@ def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled:
 
 
 def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
-    """Interpolate by a cubic spline, and by straight lines between times that are further apart than a gap [s]."""
+    """Interpolate by a cubic spline, and by straight lines between times that are further apart than a gap [s].
+
+    Where times are close together, all lines are straight.
+    """
     from scipy.interpolate import CubicSpline
 
+    if np.diff(time).min() < TIGHT * gap / GAP_PERIODS:
+        return np.interp(grid, time, values)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
     in_gap = time[after] - time[after - 1] > gap
     return np.where(in_gap, np.interp(grid, time, values), CubicSpline(time, values)(grid))

@@ -413,6 +413,17 @@ def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: sli
     assert np.isfinite(log["reference_rad_s"]).mean() > 0.99
 
 
+@pytest.mark.parametrize(
+    "late", [lambda r: r.exponential(0.4, N), lambda r: r.normal(0.0, 0.2, N), lambda r: r.normal(0.0, 0.5, N)]
+)
+def test_stamps_of_arrival_distort_nothing(late: Callable, tmp_path: Path) -> None:
+    stamps = np.maximum.accumulate(T + DT * late(np.random.default_rng(8)))
+    log = read(tmp_path, {**sine(), "t_s": np.sort(stamps) + 1e-6 * np.arange(N)})
+    assert log.dt == pytest.approx(DT, rel=1e-3)
+    assert "by straight lines; if they were measured evenly, leave time out and give --rate" in log.notes[0]
+    assert_sine(log, 5.0 * DT * AMPLITUDE * OMEGA)
+
+
 @pytest.mark.parametrize("lost", [0.02, 0.18])
 def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) -> None:
     kept = np.random.default_rng(2).uniform(size=N) > lost
@@ -507,5 +518,6 @@ def test_a_number_beyond_all_sizes_is_none(place: str, size: float, tmp_path: Pa
     log = read(tmp_path, columns)
     assert np.isfinite(log["y1_rad"]).all()
     np.testing.assert_allclose(np.nanmax(np.abs(log["reference_rad_s"])), AMPLITUDE * OMEGA, rtol=1e-3)
-    with pytest.raises(InputError, match=r"all that is needed|no number"):
-        read(tmp_path, {**columns, place: size * np.linspace(0.5, 1.0, N)})
+    for sizes in (np.linspace(0.5, 1.0, N), np.linspace(-1e-250, 1.0, N), np.sin(60.0 * T)):
+        with pytest.raises(InputError, match=f"column '{place}': .* numbers are beyond"):
+            read(tmp_path, {**columns, place: size * sizes})
