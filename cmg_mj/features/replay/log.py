@@ -259,6 +259,7 @@ _ASSIGNMENT = re.compile(
 
 
 _COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
+_NUMBER = re.compile(r"\s*[-+]?[\d.,]*\d[\d.,]*(e[-+]?\d+)?\s*", re.IGNORECASE)
 _ZONE = re.compile(r"\s+(Z|[+-]\d+:?\d*)$")
 
 
@@ -475,15 +476,17 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
 
 def _stamps(name: str, cells: Sequence[str | None]) -> np.ndarray:
     """Convert ISO dates, all with a zone or all without, to seconds from the first; NaN where there is none."""
-    stamps = []
+    stamps, wrong = [], {}
     for row, cell in enumerate(cells, 1):
         try:
             stamps.append(cell and datetime.fromisoformat(_ZONE.sub(r"\1", cell.strip().upper().replace("UTC", "Z"))))
-        except ValueError as error:
-            raise InputError(
-                f"{name}: {shortened(str(cell))!r} in row {row} is not a number or an ISO date, as "
-                "2026-11-25T10:00:00.25Z is"
-            ) from error
+        except ValueError:
+            wrong[row] = str(cell)
+    if wrong:
+        row = next((row for row in wrong if not _NUMBER.fullmatch(wrong[row])), min(wrong))
+        raise InputError(
+            f"{name}: {shortened(wrong[row])!r} in row {row} is no number and no date as 2026-11-25T10:00:00.25Z"
+        )
     try:
         first = min(stamp for stamp in stamps if stamp)
         return np.array([(stamp - first).total_seconds() if stamp else math.nan for stamp in stamps])

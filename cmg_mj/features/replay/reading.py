@@ -64,6 +64,8 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
+NO_ANGLE = 2.5 * math.pi
+"""A larger step still leads to a number that stands for none, or back [rad]."""
 CLIPPED = 5
 """Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
 STEEP = 32.0
@@ -233,12 +235,14 @@ def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[st
     """
     clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
     rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
+    meaning = "clipped, and the reference is not compared there" if "rate" in signals else "clipped, or at a stop"
     for role, values in signals.items():
         if role == "command" or role.startswith("gimbal"):
             continue  # which stand at their ends by right
         (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
         usual = np.median(np.diff(np.flatnonzero(np.diff(values, prepend=math.nan, append=math.nan))))
         steep = STEEP * smallest_step(values[np.isfinite(values)])
+        found = []
         for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
             n_rows, at_end = 0, values == end
             for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
@@ -248,10 +252,9 @@ def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[st
                     n_rows += stop - start
             if n_rows >= CLIPPED:
                 clipped |= at_end
-                notes.append(
-                    f"{at_end.sum():,} rows of {name!r} stand at the same {word} value, {(end - offset) / factor:.6g}: "
-                    "its sensor is clipped there, and the reference is not compared"
-                )
+                found.append(f"{at_end.sum():,} rows at its {word} value, {(end - offset) / factor:.6g}")
+        if found:
+            notes.append(f"{name!r} stands {', and '.join(found)}: {meaning}")
     return clipped
 
 
@@ -279,13 +282,17 @@ def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) ->
 
 def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     """Unwrap an angle that starts again after a turn, and note it."""
-    known = np.isfinite(angle)
-    jumps = int((np.abs(np.diff(angle[known])) > UNWRAP_STEP).sum())
-    if not jumps:
-        return angle
-    notes.append(f"the tilt jumps by a turn {_counted(jumps, 'time')}: made to run on")
-    out = angle.copy()
-    out[known] = np.unwrap(angle[known])
+    out, steps = angle.copy(), np.diff(angle[np.isfinite(angle)])
+    level = np.cumsum([0.0, *np.where(np.abs(steps) > NO_ANGLE, np.sign(steps), 0.0)])
+    away = level != int(np.median(level))
+    if 0.0 < away.mean() < FEW_REPEATED:
+        notes.append(f"{_counted(away.sum(), 'row')} of the tilt more than a turn from the others: not a number")
+        out[np.flatnonzero(np.isfinite(angle))[away]] = math.nan
+    known = np.isfinite(out)
+    jumps = int((np.abs(np.diff(out[known])) > UNWRAP_STEP).sum())
+    if jumps:
+        notes.append(f"the tilt jumps by a turn {_counted(jumps, 'time')}: made to run on")
+        out[known] = np.unwrap(out[known])
     return out
 
 
@@ -403,13 +410,12 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         raise InputError(f"{path}: {_counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
     steps = np.diff(time)
     if (steps < 0.0).any():
-        at = int(np.argmax(steps < 0.0))
-        raise InputError(
-            f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: cut the log there, or leave time "
-            "out and give --rate"
-        )
+        at, often = int(np.argmax(steps < 0.0)), (steps < 0.0).mean() > FEW_REPEATED
+        cure = "sort the rows by time" if often else "cut the log there, or leave time out and give --rate"
+        raise InputError(f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: {cure}")
     again = steps <= SAME_TIME * np.median(steps)
-    if again.mean() > FEW_REPEATED:
+    differ = np.logical_or.reduce([np.diff(column) != 0.0 for column in values.values()])
+    if (again & differ).mean() > FEW_REPEATED:
         rate = "HZ" if again.all() else f"{np.argmax(time == time[-1]) / (time[-1] - time[0]):.4g}"
         raise InputError(
             f"{path}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps are too "

@@ -139,6 +139,22 @@ def test_some_stamps_twice(tmp_path: Path) -> None:
     assert log.notes == ("2 rows with the time of the row before discarded, first at 0.5 s",)
 
 
+def test_rows_that_are_written_twice_count_once(tmp_path: Path) -> None:
+    log = read(tmp_path, {name: np.repeat(values, 2) for name, values in sine().items()})
+    assert_plain(log)
+    assert log.notes == ("4,000 rows with the time of the row before discarded, first at 0 s",)
+
+
+@pytest.mark.parametrize("rows", [0, slice(500, 503), N - 1])
+@pytest.mark.parametrize("value", [999999.0, -1e4])
+def test_a_number_that_stands_for_none_is_no_turn(rows: int | slice, value: float, tmp_path: Path) -> None:
+    columns = sine()
+    columns["tilt_rad"][rows] = np.radians(value)
+    log = read(tmp_path, columns)
+    assert "of the tilt more than a turn from the others" in log.notes[0]
+    assert_sine(log, 3e-4)
+
+
 def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
     t = np.arange(3000) * 0.0025
     log = read(tmp_path, {**sine(t), "t_s": np.round(t, 3)})
@@ -228,7 +244,9 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
         (lambda c: {"tilt_rad": [None] * N}, "0 rows"),
         (lambda c: {"t_s": np.zeros(N)}, "3,999 of 4,000 rows have the same time"),
         (lambda c: {"t_s": c["t_s"] * 1e4}, "rows are 50 s apart"),
-        (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back"),
+        (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back.*: cut the log there"),
+        (lambda c: {"t_s": c["t_s"][::-1]}, "time goes back.*: sort the rows by time$"),
+        (lambda c: {"t_s": [*c["t_s"][:700], "abc", *c["t_s"][701:]]}, "column 't_s': 'abc' in row 701 is no number"),
         (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "has no row"),
     ],
@@ -433,19 +451,18 @@ def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("place", "ending"),
-    [("gyro_rad_s", "largest value, 1"), ("gyro_rad_s", "smallest value, -1"), ("tilt_rad", "largest value, 0.15")],
+    ("place", "low", "high"), [("gyro_rad_s", -9, 1), ("gyro_rad_s", -1, 1.1), ("tilt_rad", -9, 0.15)]
 )
-def test_what_is_clipped_is_named_and_not_compared(place: str, ending: str, tmp_path: Path) -> None:
-    columns, limit = sine(), float(ending.split()[-1])
-    columns[place] = (np.minimum if limit > 0.0 else np.maximum)(columns[place], limit)
+def test_what_is_clipped_is_named_and_not_compared(place: str, low: float, high: float, tmp_path: Path) -> None:
+    columns = sine()
+    columns[place] = np.clip(columns[place], low, high)
     log = read(tmp_path, columns)
-    clipped = columns[place] == limit
-    assert log.notes == (
-        f"{clipped.sum():,} rows of '{place}' stand at the same {ending}: its sensor is clipped there, and the "
-        "reference is not compared",
-    )
-    np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), clipped)
+    ends = {f"largest value, {high}": columns[place] == high, f"smallest value, {low}": columns[place] == low}
+    found = ", and ".join(f"{rows.sum():,} rows at its {end}" for end, rows in ends.items() if rows.any())
+    assert log.notes == (f"'{place}' stands {found}: clipped, and the reference is not compared there",)
+    np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), np.logical_or.reduce(list(ends.values())))
+    if place == "tilt_rad":
+        assert read(tmp_path, columns, ONE).notes == (f"'{place}' stands {found}: clipped, or at a stop",)
 
 
 @pytest.mark.parametrize("step", [0.001, 0.1])
@@ -464,7 +481,7 @@ def test_a_signal_that_is_held_is_clipped_where_it_is(place: str, tmp_path: Path
     columns[place] = (columns[place] + 1e-3 * np.random.default_rng(6).standard_normal(N))[np.arange(N) // 5 * 5]
     assert read(tmp_path, columns).notes == ()
     columns[place] = np.minimum(columns[place], 0.8 * columns[place].max())
-    assert f"rows of '{place}' stand" in read(tmp_path, columns).notes[0]
+    assert f"'{place}' stands" in read(tmp_path, columns).notes[0]
 
 
 def test_a_tilt_at_rest_is_not_clipped(tmp_path: Path) -> None:
