@@ -259,7 +259,7 @@ _ASSIGNMENT = re.compile(
 
 
 _COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
-_NUMBER = re.compile(r"\s*[-+]?[\d.,]*\d[\d.,]*(e[-+]?\d+)?\s*", re.IGNORECASE)
+_NUMBER = re.compile(r"[-+.,\deE ]*\d *")
 _ZONE = re.compile(r"\s+(Z|[+-]\d+:?\d*)$")
 
 
@@ -410,7 +410,7 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             beyond = np.abs(floats) > LARGEST
             if 2 * len(np.unique(floats[beyond])) > len(floats):
                 raise InputError(f"{path}: column {name!r}: {beyond.sum():,} numbers are beyond {LARGEST:g}: its unit?")
-            values[role] = np.where(np.abs(floats) <= LARGEST, floats, np.nan) * factor + offset
+            values[role] = np.where(beyond, np.nan, floats) * factor + offset
     return values
 
 

@@ -42,7 +42,7 @@ PACKET = 1.75
 LOST = 1.25
 """Mean step, in periods, up to which single rows are lost."""
 TIGHT = 0.2
-"""A spline through rows that are less than so many periods apart swings far beyond them."""
+"""A spline through rows that are closer, in periods, swings far beyond them."""
 PAUSE = 3.0
 """Longer steps, in usual ones between packets, are pauses."""
 ALIKE = 1.5
@@ -65,7 +65,7 @@ HELD = "u_rad_s"
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
 NO_ANGLE = 2.5 * math.pi
-"""A larger step still leads to a number that stands for none, or back [rad]."""
+"""A larger step leads to a number that is no angle, or back [rad]."""
 CLIPPED = 5
 """Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
 STEEP = 32.0
@@ -282,12 +282,12 @@ def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) ->
 
 def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     """Unwrap an angle that starts again after a turn, and note it."""
-    out, steps = angle.copy(), np.diff(angle[np.isfinite(angle)])
-    level = np.cumsum([0.0, *np.where(np.abs(steps) > NO_ANGLE, np.sign(steps), 0.0)])
+    known, out = np.isfinite(angle), angle.copy()
+    steps = np.diff(angle[known])
+    level = np.cumsum([0.0, *np.sign(steps) * (np.abs(steps) > NO_ANGLE)])
     away = level != int(np.median(level))
-    if 0.0 < away.mean() < FEW_REPEATED:
-        notes.append(f"{_counted(away.sum(), 'row')} of the tilt more than a turn from the others: not a number")
-        out[np.flatnonzero(np.isfinite(angle))[away]] = math.nan
+    if away.mean() < FEW_REPEATED:
+        out[known] = np.where(away, math.nan, angle[known])
     known = np.isfinite(out)
     jumps = int((np.abs(np.diff(out[known])) > UNWRAP_STEP).sum())
     if jumps:
@@ -391,7 +391,7 @@ def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
         sizes = np.abs(changes) + np.abs(np.gradient(changes))
         pauses = between > PACKET * mean and sizes[longer].mean() > ALIKE * sizes[~longer].mean()
         uneven = np.quantile(steps, 0.1) < 0.75 * period
-        if not pauses and (uneven or mean > LOST * period or longer.mean() > LOST - 1.0):
+        if not pauses and (uneven or mean > LOST * period):
             return mean, between
     return period, 0.0
 
@@ -402,7 +402,7 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     missing = np.flatnonzero(~present)
     if len(missing):
         notes.append(
-            f"{_counted(len(missing), 'row')} of {len(present):,} without a number discarded, first row "
+            f"{_counted(len(missing), 'row')} of {len(present):,} without a usable number discarded, first row "
             f"{missing[0] + 1}"
         )
         time, values = time[present], _select(values, present)
@@ -448,10 +448,7 @@ def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled:
 
 
 def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
-    """Interpolate by a cubic spline, and by straight lines between times that are further apart than a gap [s].
-
-    Where times are close together, all lines are straight.
-    """
+    """Interpolate by a cubic spline, and by straight lines across a gap [s] or if times are tight."""
     from scipy.interpolate import CubicSpline
 
     if np.diff(time).min() < TIGHT * gap / GAP_PERIODS:
