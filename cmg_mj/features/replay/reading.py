@@ -41,8 +41,8 @@ PACKET = 1.75
 """Rows with longer usual steps between them, in their mean, come in packets: what is between is not known."""
 LOST = 1.25
 """Mean step, in periods, up to which single rows are lost."""
-TIGHT = 0.2
-"""A spline through rows that are closer, in periods, swings far beyond them."""
+TIGHT = 0.13
+"""A spline through rows that are closer, in gaps, swings far beyond them: 0.2 periods."""
 PAUSE = 3.0
 """Longer steps, in usual ones between packets, are pauses."""
 ALIKE = 1.5
@@ -281,7 +281,7 @@ def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) ->
 
 
 def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Unwrap an angle that starts again after a turn, and note it."""
+    """Unwrap an angle that starts again after a turn, and note it. A few numbers further away become NaN."""
     known, out = np.isfinite(angle), angle.copy()
     steps = np.diff(angle[known])
     level = np.cumsum([0.0, *np.sign(steps) * (np.abs(steps) > NO_ANGLE)])
@@ -343,7 +343,7 @@ def _sample(
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
         own = f"; if they were measured evenly, {cure}" if between else ""
-        lines = "straight lines" if steps.min() < TIGHT * period else "cubic splines"
+        lines = "straight lines" if steps.min() < TIGHT * gap else "cubic splines"
         notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by {lines}{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
         notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
@@ -376,10 +376,9 @@ def _sample(
 def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
     """Return the period of rows, and the usual step between packets of them, or 0 [s].
 
-    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost, and none much
-    shorter; or if they are
-    pauses, across which the signal changes by more. Otherwise long and short steps take turns, and the period is their
-    mean, from the first packet to the last.
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost and none much
+    closer; or if the longer ones are pauses, across which the signal changes by more. Otherwise long and short steps
+    take turns, and the period is their mean, from the first packet to the last.
     """
     period = float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
     longer = steps > GAP_PERIODS * period
@@ -448,10 +447,13 @@ def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled:
 
 
 def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
-    """Interpolate by a cubic spline, and by straight lines across a gap [s] or if times are tight."""
+    """Interpolate by a cubic spline, and by straight lines between times further apart than a gap [s].
+
+    If some times are close together (`TIGHT`), all lines are straight.
+    """
     from scipy.interpolate import CubicSpline
 
-    if np.diff(time).min() < TIGHT * gap / GAP_PERIODS:
+    if np.diff(time).min() < TIGHT * gap:
         return np.interp(grid, time, values)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
     in_gap = time[after] - time[after - 1] > gap
