@@ -462,8 +462,9 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     for name, cells in zip(names, table.columns, strict=True):
         if pa.types.is_floating(cells.type):
             continue
-        counts = (np.array(pc.fill_null(pc.count_substring(cells, sign), 0), int) for sign in ("\n", options.delimiter))
-        n_lines, n_delimiters = counts
+        n_lines, n_delimiters = (
+            np.array(pc.fill_null(pc.count_substring(cells, sign), 0), int) for sign in ("\n", options.delimiter)
+        )
         n_lines[-1:] -= 1  # a quote that nothing ends takes the last line's end too
         rows = np.flatnonzero((n_lines > 0) & (n_delimiters >= n_lines * (len(names) - 1)))  # text has fewer than rows
         if len(rows):

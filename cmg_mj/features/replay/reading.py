@@ -408,9 +408,14 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     if len(time) < MIN_SAMPLES:
         raise InputError(f"{path}: {_counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
     steps = np.diff(time)
-    if (steps < 0.0).any():
-        at, often = int(np.argmax(steps < 0.0)), (steps < 0.0).mean() > FEW_REPEATED
-        cure = "sort the rows by time" if often else "cut the log there, or leave time out and give --rate"
+    back = steps < 0.0
+    if back.any():
+        at = np.argmax(back)
+        cure = (
+            "sort the rows by time"
+            if back.mean() > FEW_REPEATED
+            else "cut the log there, or leave time out and give --rate"
+        )
         raise InputError(f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: {cure}")
     again = steps <= SAME_TIME * np.median(steps)
     differ = np.logical_or.reduce([np.diff(column) != 0.0 for column in values.values()])
