@@ -256,6 +256,7 @@ _ASSIGNMENT = re.compile(
 
 
 _COMMENT = re.compile(r"^\s*(?:#|%|//)+\s*")
+_NUMBER = re.compile(r"[-+.,\deE ]*\d *")
 _ZONE = re.compile(r"\s+(Z|[+-]\d+:?\d*)$")
 
 
@@ -403,7 +404,10 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
             raise InputError(f"{path}: column {name!r} holds {numbers.type}, not numbers (--delimiter, --decimal)")
         floats = numbers.cast(pa.float64(), safe=False).to_numpy()
         with np.errstate(over="ignore", invalid="ignore"):
-            values[role] = np.where(np.abs(floats) <= LARGEST, floats, np.nan) * factor + offset
+            beyond = np.abs(floats) > LARGEST
+            if 2 * len(np.unique(floats[beyond])) > len(floats):
+                raise InputError(f"{path}: column {name!r}: {beyond.sum():,} numbers are beyond {LARGEST:g}: its unit?")
+            values[role] = np.where(beyond, np.nan, floats) * factor + offset
     return values
 
 
@@ -420,10 +424,8 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     if "\0".encode(options.encoding) == b"\0":
         at = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ).find(b"\0")
         if at >= 0:
-            raise InputError(
-                f"{path}: byte {at:,} is NUL, as where a power cut ended a file; delete such bytes, as with "
-                "tr -d '\\0' < LOG > CLEAN"
-            )
+            where = "where a power cut ended a file; delete such bytes, as with tr -d '\\0' < LOG > CLEAN"
+            raise InputError(f"{path}: byte {at:,} is NUL, as {'in UTF-16: --encoding utf-16' if at < 4 else where}")
     beginning: list[str] = []
     with path.open(encoding=options.encoding, errors="replace") as lines:
         for line in lines:
@@ -439,8 +441,10 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
             found = len(wanted.intersection(cells)) - "".join(cells).startswith(tuple("+-.0123456789"))
             if cells and found > most:
                 most, names, n_skipped = found, cells, max(number + 1, last + (number == last))
+    if not wanted <= set(names) and "\ufffd" in "".join(names):
+        raise ValueError(f"its heading is not {options.encoding}")
     read = pacsv.ReadOptions(encoding=options.encoding, use_threads=False, column_names=names, skip_rows=n_skipped)
-    parse = pacsv.ParseOptions(delimiter=options.delimiter)
+    parse = pacsv.ParseOptions(delimiter=options.delimiter, newlines_in_values=True)
     kinds = dict.fromkeys(names, pa.binary())
     kinds |= dict.fromkeys(wanted, pa.float64())
     convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds, strings_can_be_null=True)
@@ -453,26 +457,34 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
         convert.column_types = kinds | {columns["time"].name.strip(): pa.string()}  # its stamps may be dates
         table = pacsv.read_csv(file, read, parse, convert)
     for name, cells in zip(names, table.columns, strict=True):
-        if not pa.types.is_floating(cells.type) and (n_lines := pc.sum(pc.count_substring(cells, "\n")).as_py()):
-            row = pc.index(pc.match_substring(cells, "\n"), True).as_py()
+        if pa.types.is_floating(cells.type):
+            continue
+        n_lines, n_delimiters = (
+            np.array(pc.fill_null(pc.count_substring(cells, sign), 0), int) for sign in ("\n", options.delimiter)
+        )
+        n_lines[-1:] -= 1  # a quote that nothing ends takes the last line's end too
+        rows = np.flatnonzero((n_lines > 0) & (n_delimiters >= n_lines * (len(names) - 1)))  # text has fewer than rows
+        if len(rows):
             raise InputError(
-                f"{path}: a quote in column {name!r}, about line {n_skipped + row + 1}, ends {n_lines:,} lines later, "
-                "which are lost: delete the quotes"
+                f"{path}: a quote in column {name!r}, about line {n_skipped + rows[0] + 1}, ends "
+                f"{n_lines[rows[0]]:,} lines later, which are lost: delete the quotes"
             )
     return table
 
 
 def _stamps(name: str, cells: Sequence[str | None]) -> np.ndarray:
     """Convert ISO dates, all with a zone or all without, to seconds from the first; NaN where there is none."""
-    stamps = []
+    stamps, wrong = [], {}
     for row, cell in enumerate(cells, 1):
         try:
             stamps.append(cell and datetime.fromisoformat(_ZONE.sub(r"\1", cell.strip().upper().replace("UTC", "Z"))))
-        except ValueError as error:
-            raise InputError(
-                f"{name}: {shortened(str(cell))!r} in row {row} is not a number or an ISO date, as "
-                "2026-11-25T10:00:00.25Z is"
-            ) from error
+        except ValueError:
+            wrong[row] = str(cell)
+    if wrong:
+        row = next((row for row in wrong if not _NUMBER.fullmatch(wrong[row])), min(wrong))
+        raise InputError(
+            f"{name}: {shortened(wrong[row])!r} in row {row} is no number and no date as 2026-11-25T10:00:00.25Z"
+        )
     try:
         first = min(stamp for stamp in stamps if stamp)
         return np.array([(stamp - first).total_seconds() if stamp else math.nan for stamp in stamps])

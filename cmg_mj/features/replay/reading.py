@@ -41,8 +41,12 @@ PACKET = 1.75
 """Rows with longer usual steps between them, in their mean, come in packets: what is between is not known."""
 LOST = 1.25
 """Mean step, in periods, up to which single rows are lost."""
+TIGHT = 0.13
+"""A spline through rows that are closer, in gaps, swings far beyond them: 0.2 periods."""
 PAUSE = 3.0
 """Longer steps, in usual ones between packets, are pauses."""
+ALIKE = 1.5
+"""Mean change of a signal and its slope across long steps, in that across short ones, up to which rows are even."""
 MIN_SAMPLES = 20
 """A segment with fewer samples is discarded."""
 BRIDGED = 5
@@ -60,6 +64,8 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
+NO_ANGLE = 2.5 * math.pi
+"""A larger step leads to a number that is no angle, or back [rad]."""
 CLIPPED = 5
 """Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
 STEEP = 32.0
@@ -224,28 +230,31 @@ def _times(
 def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
     """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
 
-    A signal that comes to its end quickly, stays, and leaves quickly is clipped. A quantised one turns in few steps.
+    A signal that comes to its end quickly, stays there for longer than elsewhere, and leaves quickly is clipped. A
+    quantised one turns in few steps.
     """
     clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
     rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
+    meaning = "clipped, and the reference is not compared there" if "rate" in signals else "clipped, or at a stop"
     for role, values in signals.items():
         if role == "command" or role.startswith("gimbal"):
             continue  # which stand at their ends by right
         (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
+        usual = np.median(np.diff(np.flatnonzero(np.diff(values, prepend=math.nan, append=math.nan))))
         steep = STEEP * smallest_step(values[np.isfinite(values)])
+        found = []
         for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
             n_rows, at_end = 0, values == end
             for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
                 fall = np.fmin.reduce(np.abs(around[[start, stop + 3]] - end))
                 rests = role == "tilt" and np.median(rate[start:stop]) < REST * np.fmax.reduce(rate)
-                if stop - start > 2 and fall * min(stop - start, 10) > steep and not rests:
+                if stop - start > 2.0 * usual and fall * min(stop - start, 10) > steep and not rests:
                     n_rows += stop - start
             if n_rows >= CLIPPED:
                 clipped |= at_end
-                notes.append(
-                    f"{at_end.sum():,} rows of {name!r} stand at the same {word} value, {(end - offset) / factor:.6g}: "
-                    "its sensor is clipped there, and the reference is not compared"
-                )
+                found.append(f"{at_end.sum():,} rows at its {word} value, {(end - offset) / factor:.6g}")
+        if found:
+            notes.append(f"{name!r} stands {', and '.join(found)}: {meaning}")
     return clipped
 
 
@@ -272,14 +281,18 @@ def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) ->
 
 
 def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Unwrap an angle that starts again after a turn, and note it."""
-    known = np.isfinite(angle)
-    jumps = int((np.abs(np.diff(angle[known])) > UNWRAP_STEP).sum())
-    if not jumps:
-        return angle
-    notes.append(f"the tilt jumps by a turn {counted(jumps, 'time')}: made to run on")
-    out = angle.copy()
-    out[known] = np.unwrap(angle[known])
+    """Unwrap an angle that starts again after a turn, and note it. A few numbers further away become NaN."""
+    known, out = np.isfinite(angle), angle.copy()
+    steps = np.diff(angle[known])
+    level = np.cumsum([0.0, *np.sign(steps) * (np.abs(steps) > NO_ANGLE)])
+    away = level != int(np.median(level))
+    if away.mean() < FEW_REPEATED:
+        out[known] = np.where(away, math.nan, angle[known])
+    known = np.isfinite(out)
+    jumps = int((np.abs(np.diff(out[known])) > UNWRAP_STEP).sum())
+    if jumps:
+        notes.append(f"the tilt jumps by a turn {counted(jumps, 'time')}: made to run on")
+        out[known] = np.unwrap(out[known])
     return out
 
 
@@ -301,7 +314,7 @@ def _sample(
     """
     time, values = _complete(path, time, measured, notes)
     steps = np.diff(time)
-    period, between = _pace(steps)
+    period, between = _pace(steps, np.diff(values["y1_rad"]))
     gap = GAP_PERIODS * period
     cure = f"leave time out and give --rate {1.0 / period:.4g}"
     if between > PACKET * period:
@@ -330,7 +343,8 @@ def _sample(
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
         own = f"; if they were measured evenly, {cure}" if between else ""
-        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by cubic splines{own}")
+        lines = "straight lines" if steps.min() < TIGHT * gap else "cubic splines"
+        notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by {lines}{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
         notes.append(f"steps of {shortest:.4g} to {longest:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
     for what, which in (
@@ -359,11 +373,12 @@ def _sample(
     return period, dt, segments
 
 
-def _pace(steps: np.ndarray) -> tuple[float, float]:
+def _pace(steps: np.ndarray, changes: np.ndarray) -> tuple[float, float]:
     """Return the period of rows, and the usual step between packets of them, or 0 [s].
 
-    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost. Otherwise long
-    and short steps take turns, and the period is their mean, from the first packet to the last.
+    Rows have the period of most steps if longer ones are few: at most one a second, or a few rows lost and none much
+    closer; or if the longer ones are pauses, across which the signal changes by more. Otherwise long and short steps
+    take turns, and the period is their mean, from the first packet to the last.
     """
     period = float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
     longer = steps > GAP_PERIODS * period
@@ -372,7 +387,10 @@ def _pace(steps: np.ndarray) -> tuple[float, float]:
         first, *_, last = np.flatnonzero(longer) + 1
         whole = steps[first:last]
         mean = float(whole[whole < PAUSE * between].mean())
-        if mean > LOST * period or longer.mean() > LOST - 1.0:
+        sizes = np.abs(changes) + np.abs(np.gradient(changes))
+        pauses = between > PACKET * mean and sizes[longer].mean() > ALIKE * sizes[~longer].mean()
+        uneven = np.quantile(steps, 0.1) < 0.75 * period
+        if not pauses and (uneven or mean > LOST * period):
             return mean, between
     return period, 0.0
 
@@ -383,20 +401,25 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
     missing = np.flatnonzero(~present)
     if len(missing):
         notes.append(
-            f"{counted(len(missing), 'row')} of {len(present):,} without a number discarded, first row {missing[0] + 1}"
+            f"{counted(len(missing), 'row')} of {len(present):,} without a usable number discarded, first row "
+            f"{missing[0] + 1}"
         )
         time, values = time[present], _select(values, present)
     if len(time) < MIN_SAMPLES:
         raise InputError(f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
     steps = np.diff(time)
-    if (steps < 0.0).any():
-        at = int(np.argmax(steps < 0.0))
-        raise InputError(
-            f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: cut the log there, or leave time "
-            "out and give --rate"
+    back = steps < 0.0
+    if back.any():
+        at = np.argmax(back)
+        cure = (
+            "sort the rows by time"
+            if back.mean() > FEW_REPEATED
+            else "cut the log there, or leave time out and give --rate"
         )
+        raise InputError(f"{path}: time goes back from {time[at]:.9g} s to {time[at + 1]:.9g} s: {cure}")
     again = steps <= SAME_TIME * np.median(steps)
-    if again.mean() > FEW_REPEATED:
+    differ = np.logical_or.reduce([np.diff(column) != 0.0 for column in values.values()])
+    if (again & differ).mean() > FEW_REPEATED:
         rate = "HZ" if again.all() else f"{np.argmax(time == time[-1]) / (time[-1] - time[0]):.4g}"
         raise InputError(
             f"{path}: {again.sum():,} of {len(time):,} rows have the same time as the row before: the stamps are too "
@@ -429,9 +452,14 @@ def _segment(time: np.ndarray, values: Values, gap: float, dt: float, resampled:
 
 
 def _resample(grid: np.ndarray, time: np.ndarray, values: np.ndarray, gap: float) -> np.ndarray:
-    """Interpolate by a cubic spline, and by straight lines between times that are further apart than a gap [s]."""
+    """Interpolate by a cubic spline, and by straight lines between times further apart than a gap [s].
+
+    If some times are close together (`TIGHT`), all lines are straight.
+    """
     from scipy.interpolate import CubicSpline
 
+    if np.diff(time).min() < TIGHT * gap:
+        return np.interp(grid, time, values)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
     in_gap = time[after] - time[after - 1] > gap
     return np.where(in_gap, np.interp(grid, time, values), CubicSpline(time, values)(grid))
@@ -488,7 +516,7 @@ def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndar
     sampled = []
     for segment in segments:
         grid, stamps = segment.time, segment.when(time) - delay_s
-        period, between = _pace(np.diff(stamps))
+        period, between = _pace(np.diff(stamps), np.diff(reference))
         gap = (2.0 if between else GAP_PERIODS) * period
         slack = 1e-6 * gap
         after = np.clip(np.searchsorted(stamps, grid, side="right"), 1, len(stamps) - 1)

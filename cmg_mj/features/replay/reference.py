@@ -124,11 +124,17 @@ def _line(sums: np.ndarray, middle: np.ndarray, length: float) -> tuple[float, f
     return float(slope), float(start) / length, float(xy / math.sqrt(xx * yy))
 
 
-def alignment_of(log: Log) -> Alignment | None:
-    """Align a log's reference with its tilt; None without a reference, and for a run's recording."""
+def alignment_of(log: Log, share: float = 1.0) -> Alignment | None:
+    """Align a log's reference, up to a share of its largest, with its tilt.
+
+    Returns:
+        The alignment; None without a reference, and for a run's recording.
+    """
     if "reference" not in log.has or log.scenario is not None:
         return None
-    tilts, references = ([log[name][part] for part in log.parts] for name in ("y1_rad", REFERENCE))
+    sizes = np.abs(log[REFERENCE])
+    reference = np.where(sizes <= share * np.nanmax(sizes), log[REFERENCE], np.nan)
+    tilts, references = ([values[part] for part in log.parts] for values in (log["y1_rad"], reference))
     return alignment(tilts, references, log.dt)
 
 
@@ -163,6 +169,16 @@ def judge(log: Log, aligned: Alignment) -> str:
         cures.append(f"--delay {options.delay_s + lag:.6g}")
     factor = 1.0
     if abs(scale - 1.0) > max(OFF, CLEAR * scale_error):
+        small = alignment_of(log, 0.5)
+        if (
+            small
+            and small.scale
+            and abs(small.scale - scale) > CLEAR * math.hypot(small.scale_error or math.inf, scale_error)
+        ):
+            return (
+                f"Beside the tilt {fits}, but {small.scale:.4f} times where it is small: it is clipped, or not linear. "
+                "No scale is offered."
+            )
         factor = scale
         cures.append(f"--scale rate={scale * scale_set:.4g}")
     motion = math.sqrt(float(np.nanmean(log[REFERENCE] ** 2)))

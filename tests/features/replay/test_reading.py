@@ -132,11 +132,21 @@ def test_a_time_range(tmp_path: Path) -> None:
     np.testing.assert_allclose(log["time_s"], T[400:1001])
 
 
-def test_some_stamps_twice(tmp_path: Path) -> None:
-    twice = np.sort(np.concatenate([np.arange(N), [100, 2000]]))
+@pytest.mark.parametrize(("rows", "first"), [([100, 2000], 0.5), (np.arange(N), 0)])
+def test_some_or_all_rows_twice(rows: list, first: float, tmp_path: Path) -> None:
+    twice = np.sort(np.concatenate([np.arange(N), rows]))
     log = read(tmp_path, {name: values[twice] for name, values in sine().items()})
     assert_plain(log)
-    assert log.notes == ("2 rows with the time of the row before discarded, first at 0.5 s",)
+    assert log.notes == (f"{len(rows):,} rows with the time of the row before discarded, first at {first} s",)
+
+
+@pytest.mark.parametrize("rows", [0, slice(500, 503), N - 1])
+def test_a_number_that_stands_for_none_is_no_turn(rows: int | slice, tmp_path: Path) -> None:
+    columns = sine()
+    columns["tilt_rad"][rows] = 1e4
+    log = read(tmp_path, columns)
+    assert "without a usable number discarded" in log.notes[0]
+    assert_sine(log, 3e-4)
 
 
 def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
@@ -179,7 +189,7 @@ def test_missing_numbers_are_gaps(tmp_path: Path) -> None:
     columns["tilt_rad"][100:102] = None, float("nan")
     columns["gyro_rad_s"][500] = None
     log = read(tmp_path, columns)
-    assert "2 rows of 4,000 without a number discarded, first row 101" in log.notes[0]
+    assert "2 rows of 4,000 without a usable number discarded, first row 101" in log.notes[0]
     assert len(log) == N
     assert np.isfinite(log["y1_rad"]).all()
     assert np.isnan(log["reference_rad_s"]).sum() == 1
@@ -228,7 +238,9 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
         (lambda c: {"tilt_rad": [None] * N}, "0 rows"),
         (lambda c: {"t_s": np.zeros(N)}, "3,999 of 4,000 rows have the same time"),
         (lambda c: {"t_s": c["t_s"] * 1e4}, "rows are 50 s apart"),
-        (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back"),
+        (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back.*: cut the log there"),
+        (lambda c: {"t_s": c["t_s"][::-1]}, "time goes back.*: sort the rows by time$"),
+        (lambda c: {"t_s": [*c["t_s"][:700], "abc", *c["t_s"][701:]]}, "column 't_s': 'abc' in row 701 is no number"),
         (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "has no row"),
     ],
@@ -391,6 +403,16 @@ def test_packets_are_refused_with_the_cure(kind: str, rows: slice, tmp_path: Pat
         assert float(str(info.value).split()[-1]) == pytest.approx(200.0, rel=0.005)
 
 
+@pytest.mark.parametrize(("kept", "of", "parts"), [(140, 200, 20), (100, 200, 20), (32, 50, 80), (38, 80, 50)])
+def test_pauses_are_no_packets(kept: int, of: int, parts: int, tmp_path: Path) -> None:
+    """A pause of half a period too, across which the tilt changes by nothing."""
+    columns = sine()
+    columns["tilt_rad"] += 1e-3 * np.random.default_rng(5).standard_normal(N)
+    log = read(tmp_path, {name: values[np.arange(N) % of < kept] for name, values in columns.items()})
+    assert (log.dt, len(log.parts)) == (DT, parts)
+    assert_sine(log, 6e-3)
+
+
 @pytest.mark.parametrize("rows", [slice(None), slice(1, -1)])
 @pytest.mark.parametrize("steps", [(4, 16), (7, 7, 16)])
 def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: slice, tmp_path: Path) -> None:
@@ -402,6 +424,17 @@ def test_steps_that_take_turns_are_sampled_at_their_mean(steps: tuple, rows: sli
     assert np.isfinite(log["reference_rad_s"]).mean() > 0.99
 
 
+@pytest.mark.parametrize(
+    "late", [lambda r: r.exponential(0.4, N), lambda r: r.normal(0.0, 0.2, N), lambda r: r.normal(0.0, 0.5, N)]
+)
+def test_stamps_of_arrival_distort_nothing(late: Callable, tmp_path: Path) -> None:
+    stamps = np.maximum.accumulate(T + DT * late(np.random.default_rng(8)))
+    log = read(tmp_path, {**sine(), "t_s": np.sort(stamps) + 1e-6 * np.arange(N)})
+    assert log.dt == pytest.approx(DT, rel=1e-3)
+    assert "by straight lines; if they were measured evenly, leave time out and give --rate" in log.notes[0]
+    assert_sine(log, 5.0 * DT * AMPLITUDE * OMEGA)
+
+
 @pytest.mark.parametrize("lost", [0.02, 0.18])
 def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) -> None:
     kept = np.random.default_rng(2).uniform(size=N) > lost
@@ -411,19 +444,18 @@ def test_lost_rows_leave_the_others_where_they_are(lost: float, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("place", "ending"),
-    [("gyro_rad_s", "largest value, 1"), ("gyro_rad_s", "smallest value, -1"), ("tilt_rad", "largest value, 0.15")],
+    ("place", "low", "high"), [("gyro_rad_s", -9, 1), ("gyro_rad_s", -1, 1.1), ("tilt_rad", -9, 0.15)]
 )
-def test_what_is_clipped_is_named_and_not_compared(place: str, ending: str, tmp_path: Path) -> None:
-    columns, limit = sine(), float(ending.split()[-1])
-    columns[place] = (np.minimum if limit > 0.0 else np.maximum)(columns[place], limit)
+def test_what_is_clipped_is_named_and_not_compared(place: str, low: float, high: float, tmp_path: Path) -> None:
+    columns = sine()
+    columns[place] = np.clip(columns[place], low, high)
     log = read(tmp_path, columns)
-    clipped = columns[place] == limit
-    assert log.notes == (
-        f"{clipped.sum():,} rows of '{place}' stand at the same {ending}: its sensor is clipped there, and the "
-        "reference is not compared",
-    )
-    np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), clipped)
+    ends = {f"largest value, {high}": columns[place] == high, f"smallest value, {low}": columns[place] == low}
+    found = ", and ".join(f"{rows.sum():,} rows at its {end}" for end, rows in ends.items() if rows.any())
+    assert log.notes == (f"'{place}' stands {found}: clipped, and the reference is not compared there",)
+    np.testing.assert_array_equal(np.isnan(log["reference_rad_s"]), np.logical_or.reduce(list(ends.values())))
+    if place == "tilt_rad":
+        assert read(tmp_path, columns, ONE).notes == (f"'{place}' stands {found}: clipped, or at a stop",)
 
 
 @pytest.mark.parametrize("step", [0.001, 0.1])
@@ -434,6 +466,15 @@ def test_a_quantiser_is_not_clipped(step: float, noise: float, tmp_path: Path) -
         columns, q = sine(), step * size
         columns[name] = q * np.round(columns[name] / q + noise * random.standard_normal(N))
         assert not any("clipped" in note for note in read(tmp_path, columns).notes)
+
+
+@pytest.mark.parametrize("place", ["tilt_rad", "gyro_rad_s"])
+def test_a_signal_that_is_held_is_clipped_where_it_is(place: str, tmp_path: Path) -> None:
+    columns = sine()
+    columns[place] = (columns[place] + 1e-3 * np.random.default_rng(6).standard_normal(N))[np.arange(N) // 5 * 5]
+    assert read(tmp_path, columns).notes == ()
+    columns[place] = np.minimum(columns[place], 0.8 * columns[place].max())
+    assert f"'{place}' stands" in read(tmp_path, columns).notes[0]
 
 
 def test_a_tilt_at_rest_is_not_clipped(tmp_path: Path) -> None:
@@ -449,16 +490,34 @@ def test_nul_bytes_are_named(at: int, tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", sine())
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[: at + 1]) + bytes(40) + b"".join(lines[at + 1 :]))
-    with pytest.raises(InputError, match=f"byte {len(b''.join(lines[: at + 1])):,} is NUL"):
+    with pytest.raises(InputError, match=f"byte {len(b''.join(lines[: at + 1])):,} is NUL.* power cut"):
         read_log(path, ReadOptions(COLUMNS))
 
 
-def test_a_quote_that_swallows_rows_is_named(tmp_path: Path) -> None:
-    note = ["ok"] * N
-    note[100], note[295] = '"oops', 'x"'
+@pytest.mark.parametrize(
+    ("encoding", "cure"),
+    [("utf-16", "--encoding utf-16$"), ("utf-16-be", "--encoding utf-16$"), ("latin-1", "not utf-8.*--encoding")],
+)
+def test_another_encoding_is_named(encoding: str, cure: str, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", {"t_s": T, "Neigung_°": tilt(T)})
+    path.write_bytes(path.read_text("utf-8").encode(encoding))
+    options = ReadOptions({**ONE, "tilt": "Neigung_°"})
+    with pytest.raises(InputError, match=cure):
+        read_log(path, options)
+    assert len(read_log(path, dataclasses.replace(options, encoding=encoding))) == N
+
+
+@pytest.mark.parametrize(("end", "n_lines"), [(295, 195), (101, 1), (N, N - 101)])
+def test_a_quote_that_swallows_rows_is_named(end: int, n_lines: int, tmp_path: Path) -> None:
+    note = ["ok"] * N + ['x"']
+    note[100], note[end] = '"oops', 'x"'
     for name in ("note", "t_s2"):
-        with pytest.raises(InputError, match=f"a quote in column '{name}', about line 102, ends 195 lines later"):
-            read(tmp_path, {**sine(), name: note})
+        with pytest.raises(InputError, match=f"column '{name}', about line 102, ends {n_lines:,} lines later"):
+            read(tmp_path, {**sine(), name: note[:N]})
+
+
+def test_text_of_two_lines_is_none(tmp_path: Path) -> None:
+    assert_plain(read(tmp_path, {"note": ['"a, ""b""\nand c"', "ok"] * (N // 2), **sine()}))
 
 
 @pytest.mark.parametrize(("place", "size"), [("tilt_rad", 1e308), ("gyro_rad_s", 1e200), ("t_s", 3e307)])
@@ -469,5 +528,6 @@ def test_a_number_beyond_all_sizes_is_none(place: str, size: float, tmp_path: Pa
     log = read(tmp_path, columns)
     assert np.isfinite(log["y1_rad"]).all()
     np.testing.assert_allclose(np.nanmax(np.abs(log["reference_rad_s"])), AMPLITUDE * OMEGA, rtol=1e-3)
-    with pytest.raises(InputError, match=r"all that is needed|no number"):
-        read(tmp_path, {**columns, place: size * np.linspace(0.5, 1.0, N)})
+    for sizes in (np.linspace(0.5, 1.0, N), np.linspace(-1e-250, 1.0, N), np.sin(60.0 * T)):
+        with pytest.raises(InputError, match=f"column '{place}': .* numbers are beyond"):
+            read(tmp_path, {**columns, place: size * sizes})

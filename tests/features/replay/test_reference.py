@@ -74,6 +74,17 @@ def test_a_small_bias_and_a_small_scale_error_are_told(tmp_path: Path) -> None:
     assert "--offset rate=-2.9" in remark(tmp_path, tilt, np.degrees(rate), units={"rate": "deg_s"})
 
 
+@pytest.mark.parametrize("blur", [0.02 * noise(1), np.linspace(0.0, 0.05, N)])
+def test_a_clipped_rate_is_offered_no_scale(blur: np.ndarray, tmp_path: Path) -> None:
+    """Noise or a drift hides the end of its range."""
+    tilt, rate = multisine(2)
+    tilt += 1e-3 * noise()
+    said = remark(tmp_path, tilt, blur + np.clip(rate, -0.5 * rate.max(), 0.5 * rate.max()))
+    assert "it is clipped, or not linear" in said
+    assert "--" not in said
+    assert "--scale rate=" in remark(tmp_path, tilt, blur + 0.9 * rate)
+
+
 def multisine(seed: int) -> tuple[np.ndarray, np.ndarray]:
     random, t = np.random.default_rng(seed), DT * np.arange(N)
     pairs = list(zip(random.uniform(2.0, 20.0, 6), random.uniform(0.0, 2.0 * np.pi, 6), strict=True))
