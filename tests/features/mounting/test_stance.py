@@ -198,6 +198,16 @@ MOVES = "rests on the body '{}', which moves: let the two not collide"
             {},
             "--body trunk: has no mass of its own; the bodies with mass on it: link",
         ),
+        (
+            trunk().replace("<option", '<option density="1000"'),
+            {},
+            "<option density=1000 viscosity=0>: the fluid brakes",
+        ),
+        (
+            trunk(before='<default><geom condim="6" friction="1 1 1"/></default>'),
+            {},
+            r"falls too slowly .*: rolling friction \(condim 4 or 6\) holds it",
+        ),
         (trunk(), {"body": "base"}, "--body base: no such body"),
         (
             trunk(more='<geom size="0.1" pos="3 0 0"/>'),
@@ -210,6 +220,46 @@ def test_refused_by_the_true_reason(text: str, options: dict[str, Any], message:
     with pytest.raises(InputError, match=message) as info:
         put(text, **options)
     assert "\n" not in str(info.value)
+
+
+PUSHED = "above the line a spring, an actuator or a fluid pushes the robot by {} N m, as much as gravity at"
+HELD = "falls too slowly from .*: {} holds it; take that out of the file"
+HINGED = """
+<mujoco><option timestep="0.002"/><worldbody>{more}
+  <body name="trunk" pos="0 0 1"><joint name="h" axis="0 1 0" {joint}/>
+    <geom type="box" size=".05 .05 .2" pos="{x} 0 .2" mass="5"/><site name="top" pos="0 0 0.4"/>
+  </body></worldbody>{after}
+</mujoco>
+"""
+SERVO = '<actuator><position joint="h" kp="100"/></actuator>'
+GUY = '<tendon><spatial stiffness="2e3"><site site="top"/><site site="{}"/></spatial></tendon>'
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"joint": 'stiffness="15" springref="20"'}, PUSHED.format("5.24")),
+        ({"joint": 'stiffness="3" springref="-60"'}, PUSHED.format("-3.14")),
+        ({"joint": 'stiffness="10"', "x": 0.08}, PUSHED.format("3.81")),
+        (
+            {"after": '<actuator><general joint="h" biastype="affine" biasprm="4 0 0"/></actuator>'},
+            PUSHED.format(4),
+        ),
+        ({"joint": 'stiffness="60"'}, HELD.format("the joint's spring")),
+        ({"joint": 'frictionloss="0.5"'}, HELD.format("the joint's frictionloss")),
+        ({"after": SERVO}, HELD.format("an actuator of the joint")),
+        ({"more": '<site name="at" pos="1 0 1.4"/>', "after": GUY.format("at")}, HELD.format("a tendon")),
+        ({"joint": 'stiffness="15"', "after": '<actuator><motor joint="h"/></actuator>'}, ""),
+    ],
+)
+def test_what_pushes_or_holds_a_hinge_is_named(fields: dict[str, Any], message: str) -> None:
+    """By hand: the torque of a spring is k (springref - q), of 20 deg, or of q = -atan(0.08/0.2)."""
+    text = HINGED.format(**({"joint": "", "x": 0, "more": "", "after": ""} | fields))
+    if not message:
+        put(text, scale=1.0)
+        return
+    with pytest.raises(InputError, match=message):
+        put(text, scale=1.0)
 
 
 @pytest.mark.parametrize(
