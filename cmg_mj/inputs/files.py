@@ -23,8 +23,6 @@ _ATTRIBUTE = re.compile(r"""([^\s=<>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 MAX_MODEL_BYTES = 50_000_000
 MAX_TOML_BYTES = 10_000_000
 """A scenario or study is smaller; the longest scenario that a run writes has three thousand bytes."""
-MAX_DEPTH = 50
-"""Most tables and lists of a file within each other; a scenario has five."""
 MAX_COPIES = 20_000
 """Most elements that <replicate> and the like make in all; MuJoCo takes up to a minute for so many bodies."""
 FREE_COUNTS = 15
@@ -121,18 +119,11 @@ def read_toml(path: Path, name: str) -> dict[str, Any]:
     if text.lstrip().startswith("<"):
         raise InputError(f"{name}: is XML, not a scenario; a scenario names its model with plant.model")
     try:
-        fields = tomllib.loads(text)
-        nested: list[Any] = [fields]
-        for _ in range(MAX_DEPTH):
-            nested = [part for each in nested for part in (each.values() if isinstance(each, dict) else each)]
-            nested = [part for part in nested if isinstance(part, (dict, list))]
-        if nested:
-            raise RecursionError
+        return tomllib.loads(text)
     except RecursionError as error:
-        raise InputError(f"{name}: not valid TOML: more than {MAX_DEPTH} tables and brackets in each other") from error
+        raise InputError(f"{name}: not valid TOML: brackets in too many brackets") from error
     except ValueError as error:  # a TOMLDecodeError, or a number of too many digits
         raise InputError(f"{name}: not valid TOML: {error}") from error
-    return fields
 
 
 def read_text(path: Path, name: str, max_bytes: int) -> str:
