@@ -453,6 +453,7 @@ def _holders(model: mujoco.MjModel, data: mujoco.MjData, line: Line) -> str:
         "the joint's frictionloss": model.dof_frictionloss[line.push[0]],
         "the joint's spring": model.jnt_stiffness[line.joint],
         "an actuator of the joint": on_joints & driven,
+        "an equality of the joint": (model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj1id == line.joint),
         "a tendon": model.ntendon,
         "rolling friction (condim 4 or 6)": [contact.dim > 3 for contact in data.contact[: data.ncon]],
     }
