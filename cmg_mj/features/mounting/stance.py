@@ -418,8 +418,8 @@ def check_falls(model: mujoco.MjModel, key: int, axis: Axis) -> None:
     lean = math.degrees(abs(push) / (axis.reduced.gimbals * axis.reduced.gravity_torque))
     if lean > PUSHED_DEG:
         raise InputError(
-            f"with its mass above the line a spring, an actuator or a fluid pushes the robot by {push:.3g} N m, as "
-            f"much as gravity at {lean:.3g} deg: let that be nothing there (springref, biasprm, ctrl, wind)"
+            f"with its mass above the line a spring or an actuator pushes the robot by {push:.3g} N m, as "
+            f"much as gravity at {lean:.3g} deg: let that be nothing there (springref, biasprm, ctrl)"
         )
     for module in axis.modules:
         drag, motor = abs(data.qfrc_passive[module.flywheel_dof]), model.actuator_gainprm[module.motor, 0]

@@ -17,6 +17,7 @@ from cmg_mj.features.mounting.report import _advice
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import axis_modules
 from cmg_mj.plant.plant import load_plant
+from cmg_mj.plant.settings import FLAGS_OFF
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
@@ -222,7 +223,7 @@ def test_refused_by_the_true_reason(text: str, options: dict[str, Any], message:
     assert "\n" not in str(info.value)
 
 
-PUSHED = "above the line a spring, an actuator or a fluid pushes the robot by {} N m, as much as gravity at"
+PUSHED = "above the line a spring or an actuator pushes the robot by {} N m, as much as gravity at"
 HELD = "falls too slowly from .*: {} holds it; take that out of the file"
 HINGED = """
 <mujoco><option timestep="0.002"/><worldbody>{more}
@@ -311,18 +312,24 @@ def test_a_keyframe_is_kept_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    "option", ['actuatorgroupdisable="0 3"', "><flag sleep='enable'/></option", "><flag ipc='enable'/></option"]
+    ("option", "flags"),
+    [
+        ('actuatorgroupdisable="0 3"', ""),
+        ('density="1.2" wind="5 0 0"', ""),
+        ("", "sleep='enable'"),
+        ('integrator="discrete" solver="CG"', "ipc='enable'"),
+        ("", "fwdinv='enable' invdiscrete='enable'"),
+    ],
 )
-def test_the_pair_works_whatever_the_file_switches(option: str) -> None:
-    """Groups of actuators that are off, and flags that many worlds at once do not know."""
-    option = option.replace("><flag ipc", ' integrator="discrete" solver="CG"><flag ipc')
-    text = trunk().replace('timestep="0.002"/', f'timestep="0.002" {option}' + "/" * (option[-1] == '"'))
+def test_the_pair_works_whatever_the_file_switches(option: str, flags: str) -> None:
+    """Groups of actuators that are off, wind, and flags that RK4 or many worlds at once do not know."""
+    text = trunk().replace('timestep="0.002"/', f'timestep="0.002" {option}><flag {flags}/></option')
     Path("robot.xml").write_text(text, encoding="utf-8")
     command = ("mount", "robot.xml", "--body", "trunk", "--scale", "1.2", "-o", "pair.xml", "--quick")
     assert cmg_mj(*command).status == 0
     stood = prepare(load_scenario("pair.toml", ["push=[]", "duration_s=3"])).run_many(2, keep_trajectory=False).stood
     assert stood.all()
-    assert not load_plant(model="pair.xml").model.opt.enableflags
+    assert not load_plant(model="pair.xml").model.opt.enableflags & FLAGS_OFF
 
 
 def test_flags_of_a_file_by_hand_are_off_in_every_run() -> None:

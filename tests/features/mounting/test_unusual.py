@@ -215,7 +215,9 @@ def test_what_only_drives_a_joint_does_not_hold_it(drive: str) -> None:
             {},
             "falls too slowly from a tilt of 0.05 deg, with 0 1/s; .*: an equality of the joint holds it",
         ),
-        ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
+        ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/>: pulls 180 deg off straight down'),
+        ({"option": 'gravity="0 0 0"'}, {}, 'gravity="0 0 0"/>: pulls 180 deg off straight down'),
+        ({"option": 'gravity="0.5 0 -9.8"'}, {}, 'gravity="0.5 0 -9.8"/>: pulls 2.92 deg off straight down'),
     ],
 )
 def test_refused_in_one_line(changes: dict[str, str], options: dict[str, Any], message: str) -> None:
