@@ -129,8 +129,8 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, he
             break
     else:
         raise InputError(
-            "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
-            'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
+            "the robot has nothing to stand on: no geom of its collides with one of the world's; let them (contype, "
+            'conaffinity, <exclude>, <flag contact>), or give it a floor: <geom type="plane" size="5 5 0.1"/>'
         )
     free, touching = max(last, at), min(last, at)
     while free - touching > SEARCH_ERROR * step:
@@ -350,7 +350,8 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
         raise InputError(
             f"the hinge {name!r} would stand upright at {upright:.4g} rad, at the end of its range of {low:.4g} to "
-            f"{high:.4g} or beyond its range: widen the range, so that it can lean by {STANDS_DEG:g} deg either way"
+            f"{high:.4g}, less a margin of {model.jnt_margin[joint]:.4g}, or beyond its range: widen the range, so that "
+            f"it can lean by {STANDS_DEG:g} deg either way"
         )
     qpos = qpos.copy()
     qpos[address] = upright

@@ -209,6 +209,7 @@ MOVES = "rests on the body '{}', which moves: let the two not collide"
             {},
             r"falls too slowly .*: rolling friction \(condim 4 or 6\) holds it",
         ),
+        (trunk(after='<contact><exclude body1="world" body2="trunk"/></contact>'), {}, "conaffinity, <exclude>"),
         (trunk(), {"body": "base"}, "--body base: no such body"),
         (
             trunk(more='<geom size="0.1" pos="3 0 0"/>'),
