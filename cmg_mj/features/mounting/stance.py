@@ -350,7 +350,7 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
         raise InputError(
             f"the hinge {name!r} would stand upright at {upright:.4g} rad, at the end of its range of {low:.4g} to "
-            f"{high:.4g}, less a margin of {model.jnt_margin[joint]:.4g}, or beyond its range: widen the range, so that "
+            f"{high:.4g}, less a margin of {model.jnt_margin[joint]:.4g}, or beyond its range: widen it, so that "
             f"it can lean by {STANDS_DEG:g} deg either way"
         )
     qpos = qpos.copy()
@@ -449,14 +449,14 @@ def check_falls(model: mujoco.MjModel, key: int, axis: Axis) -> None:
 
 def _holders(model: mujoco.MjModel, data: mujoco.MjData, line: Line) -> str:
     """Say what may keep a robot from falling, as far as its model has it."""
-    on_joints, driven = np.isin(model.actuator_trntype, ON_A_JOINT), model.actuator_trnid[:, 0] == line.joint
+    driven = np.isin(model.actuator_trntype, ON_A_JOINT) & (model.actuator_trnid[:, 0] == line.joint)
     found = {
         "the joint's frictionloss": model.dof_frictionloss[line.push[0]],
         "the joint's spring": model.jnt_stiffness[line.joint],
-        "an actuator of the joint": on_joints & driven,
+        "an actuator of the joint": model.actuator_biasprm[driven],
         "an equality of the joint": (model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj1id == line.joint),
-        "a tendon": model.ntendon,
-        "rolling friction (condim 4 or 6)": [contact.dim > 3 for contact in data.contact[: data.ncon]],
+        "a tendon": np.append(model.tendon_stiffness, model.tendon_limited),
+        "rolling friction (condim 6)": [contact.dim > 4 for contact in data.contact[: data.ncon]],
     }
     if holders := [what for what, values in found.items() if np.any(values)]:
         return f"{' or '.join(holders)} holds it; take that out of the file"
