@@ -23,8 +23,7 @@ from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 YAW_SERVO = "yaw_servo"
-_OFF = mujoco.mjtEnableBit
-FLAGS_OFF = int(_OFF.mjENBL_SLEEP | _OFF.mjENBL_IPC | _OFF.mjENBL_INVDISCRETE)
+FLAGS_OFF = sum(int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}")) for flag in ("SLEEP", "IPC", "INVDISCRETE"))
 """Flags that worlds which are stepped together cannot have, and one that RK4 cannot."""
 
 
