@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import math
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 from cmg_mj.core.errors import InputError, nearest
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_COMMENT = re.compile(r"""<!--.*?-->|"[^"]*"|'[^']*'""", re.DOTALL)
-"""A comment, which a parser must not see: MuJoCo allows `--` in it; or a quoted text, where there is none."""
+_TAG = re.compile(
+    r"""<(?:!--.*?(?:-->|\Z)|!\[CDATA\[.*?(?:\]\]>|\Z)|[!?][^>]*>|"""
+    r"""(/?)([^\s<>"'/]+)((?:[^<>"']++|"[^"]*"|'[^']*')*+)>)""",
+    re.DOTALL,
+)
+"""A tag, or what may hold some that are none. No parser of XML is so lenient as MuJoCo's."""
+_ATTRIBUTE = re.compile(r"""([^\s=<>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 MAX_MODEL_BYTES = 50_000_000
 MAX_TOML_BYTES = 10_000_000
 """A scenario or study is smaller; the longest scenario that a run writes has three thousand bytes."""
 MAX_COPIES = 20_000
-"""Most copies of an element that <replicate> and the like make; MuJoCo takes 20 s for five times as many."""
+"""Most elements that <replicate> and the like make in all; MuJoCo takes up to a minute for so many bodies."""
+FREE_COUNTS = 15
+"""As how many copies a free body or a point of a flex counts: their equations of motion are one full matrix."""
 FOLDERS = "meshdir", "texturedir", "assetdir"
 
 
@@ -146,55 +153,53 @@ def model_files(path: Path) -> list[Path]:
     """List a model's file and those that it includes or attaches, as far as they are there.
 
     Raises:
-        InputError: What would crash MuJoCo or keep it busy for ever: a file that includes itself, no XML, too many
-            copies, an asset that is no ordinary file. Or a file cannot be read.
+        InputError: What would crash MuJoCo or keep it busy for ever: a file that includes itself, too many copies,
+            an asset that is no ordinary file. Or a file cannot be read.
     """
     files: list[Path] = []
-    folders, names = {""}, set[str]()
+    folders, names, total = {""}, set[str](), 0.0
 
-    def read(file: Path, within: tuple[Path, ...], copies: int) -> None:
+    def read(file: Path, within: tuple[Path, ...], copies: float) -> None:
+        nonlocal total
         if file.resolve() in (outer.resolve() for outer in within):
             raise InputError(f"{path}: contains itself: {' in '.join(each.name for each in (*within, file))}")
         name = f"{path}: {file.name}" if within else str(path)
-        text = _COMMENT.sub(_without_comment, read_text(file, name, MAX_MODEL_BYTES)).lstrip()
-        within, stack, inner, attached = (*within, file), [copies], list[tuple[str, int]](), 0
-
-        def start(tag: str, attributes: dict[str, str]) -> None:
-            nonlocal attached
-            counts = [int(count) for count in attributes.get("count", "").split() if count.isdecimal()]
-            stack.append(stack[-1] * max(1, math.prod(counts)))
-            attached += stack[-1] * (tag == "attach")
-            if stack[-1] > MAX_COPIES or attached > MAX_COPIES:
-                raise InputError(f"{name}: <{tag}>: makes {stack[-1]:.3g} copies; at most {MAX_COPIES:,} are read")
+        text = read_text(file, name, MAX_MODEL_BYTES)
+        within, stack, inner, attached = (*within, file), [copies], list[tuple[str, float]](), 0.0
+        for end, tag, rest in _TAG.findall(text):
+            if end:
+                stack[1:] = stack[1:-1]
+            if end or not tag:
+                continue
+            # Of an attribute given twice MuJoCo takes the first.
+            attributes = {key: html.unescape(a or b) for key, a, b in reversed(_ATTRIBUTE.findall(rest))}
+            made = stack[-1] * max(1.0, math.prod(map(float, re.findall(r"[+-]?\d+", attributes.get("count", "")))))
+            moves = tag in ("freejoint", "flexcomp") or attributes.get("type") == "free"
+            total += made * (made > 1.0) * (FREE_COUNTS if moves else 1)
+            attached += made * (tag == "attach")
+            if total > MAX_COPIES:
+                raise InputError(
+                    f"{name}: <{tag}>: makes {made:.3g} copies; at most {MAX_COPIES:,} are read in all, of free bodies "
+                    f"and points of a flex {MAX_COPIES // FREE_COUNTS:,}"
+                )
             folders.update(attributes[key] for key in FOLDERS if key in attributes)
             names.update(value for key, value in attributes.items() if key.startswith("file"))
             if tag in ("include", "model") and "file" in attributes:
-                inner.append((attributes["file"], stack[-1] if tag == "include" else 0))
-
-        parser = expat.ParserCreate()
-        parser.StartElementHandler, parser.EndElementHandler = start, lambda _: stack.pop()
-        try:
-            parser.Parse(text, True)
-        except expat.ExpatError as error:
-            why = f"XML syntax error at line {error.lineno}: {expat.ErrorString(error.code)}"
-            raise InputError(f"{name}: not a model MuJoCo can read: {why}") from error
+                inner.append((attributes["file"], made if tag == "include" else 0.0))
+            if not rest.endswith("/"):
+                stack.append(made)
         files.append(file)
         for included, times in inner:
             places = (file.parent / included, path.parent / included)
             for place in [place for place in places if place.is_file()][:1]:
                 read(place, within, times or max(copies, attached))
 
-    read(path, (), 1)
+    read(path, (), 1.0)
     for base, below, asset in itertools.product({file.parent for file in files}, folders, names):
         for place in (base / below / asset.removeprefix("package://"), base / below / Path(asset).name):
             if place.exists() and not (place.is_file() or place.is_dir()):
                 raise InputError(f"{path}: {asset}: is no ordinary file")
     return files
-
-
-def _without_comment(part: re.Match[str]) -> str:
-    """Replace a comment by its line breaks, and keep a quoted text."""
-    return "\n" * part[0].count("\n") if part[0].startswith("<!--") else part[0]
 
 
 def whole_path(file: str, beside: Path) -> str:

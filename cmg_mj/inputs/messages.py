@@ -81,7 +81,7 @@ def complaints(root: Any, errors: Iterable[Mapping[str, Any]], fields: Mapping[s
 _WORDS_OF_TYPE = {
     "missing": "must have more elements",  # of an element of a tuple
     "string_pattern_mismatch": "must have no control characters",
-    "json_invalid": "not UTF-8 text",
+    "json_invalid": "not UTF-8 text, or tables in too many tables",
 }
 _WORDS = {
     "Value error, ": "",

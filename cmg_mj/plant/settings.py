@@ -23,8 +23,8 @@ from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
 YAW_SERVO = "yaw_servo"
-NO_BATCH = int(mujoco.mjtEnableBit.mjENBL_SLEEP | mujoco.mjtEnableBit.mjENBL_IPC)
-"""Flags that worlds which are stepped together cannot have."""
+FLAGS_OFF = sum(int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}")) for flag in ("SLEEP", "IPC", "INVDISCRETE"))
+"""Flags that worlds which are stepped together cannot have, and one that RK4 cannot."""
 
 
 def apply(
@@ -86,7 +86,7 @@ def _vary_masses_and_friction(
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     # A plant that diverges must say so, not start again from its reference pose.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    model.opt.enableflags &= ~NO_BATCH
+    model.opt.enableflags &= ~FLAGS_OFF
     gimbals, hinges = [module.gimbal_dof for module in modules], [axis.line.dof for axis in axes]
     for field, dofs, value in (
         (model.dof_armature, gimbals, settings.gimbal_armature_kg_m2),

@@ -345,6 +345,8 @@ def parse_scenario(fields: Mapping[str, Any], source: str = "") -> Scenario:
         wrong = out_of_size(fields)
     except ValidationError as error:
         scenario, wrong = None, complaints(Scenario, error.errors(), fields)
+    except RecursionError as error:
+        raise InputError(located(source, "tables in too many tables")) from error
     clauses = list(dict.fromkeys([*wrong, *_unknown_to_bench_law(fields)]))
     if len(clauses) > MAX_CLAUSES:
         clauses[MAX_CLAUSES:] = [f"and {len(clauses) - MAX_CLAUSES} more"]

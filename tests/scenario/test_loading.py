@@ -233,6 +233,8 @@ def _sparse(path: Path) -> None:
 STRANGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "a FIFO": (lambda path: os.mkfifo(path), "no ordinary file"),
     "a device": (lambda path: path.symlink_to("/dev/zero"), "no ordinary file"),
+    "many dots": (lambda path: path.write_text(".".join("a" * 5000) + "=1"), "tables in too many tables"),
+    "dots": (lambda path: path.write_text(".".join("a" * 300) + "=1"), "tables in too many tables"),
     "many brackets": (lambda path: path.write_text("a=" + "[" * 5000), "not valid TOML: "),
     "3 GB": (_sparse, "larger than 10 MB"),
     "no UTF-8": (lambda path: path.write_bytes(b"a = '\xff'"), "not UTF-8 text"),

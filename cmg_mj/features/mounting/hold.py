@@ -57,7 +57,7 @@ IMPEDANCE = 0.9999
 of every acceleration. With MuJoCo's default of 0.9 to 0.95 a trunk on its waist jerks with every change of the command,
 and its accelerometers show that as tilt."""
 SAME_PLACE = 1e-3
-"""Largest distance of a joint from where a constraint of the file holds it [rad, m]; files have six digits."""
+"""Largest distance from where a constraint of the file holds what it ties [rad, m]; files have six digits."""
 
 
 def unused_name(name: str, names: Collection[str]) -> str:
@@ -110,21 +110,20 @@ def hold_joints(
     working = [a for a in spec.actuators if not spec.option.disableactuator >> a.group & 1]
     servos = [a for a in working if a.trntype in ON_A_JOINT and _pulls_back(a.biastype, a.biasprm)]
     on_servos = [servo.target for servo in servos if request.hold == "servos"]
-    ties = {joint: tie for tie in spec.equalities if (joint := joint_held(spec, tie))}
-    free = {*moving, *request.release}
-    for name, tie in ties.items():
-        if name not in free:
-            target, stands = model.joint(name).qpos0[0] + tie.data[0], poses[name][0]
-            if tie.type == mujoco.mjtEq.mjEQ_JOINT and abs(target - stands) > SAME_PLACE:
-                raise InputError(
-                    f"equality {tie.name!r} holds the joint {name!r} at {target:.4g}, and the robot is to stand with "
-                    f"it at {stands:.4g}: give a --keyframe that has it there, or take the equality out of the file"
-                )
-        elif tie.name.startswith(f"{name}_held"):  # the user's own is the user's
+    free, ties, data = {*moving, *request.release}, set[str](), posed(model, pose)
+    broken = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (np.abs(data.efc_pos) > SAME_PLACE)
+    for i, tie in enumerate(list(spec.equalities)):
+        name = joint_held(spec, tie)
+        ties.add(name)
+        if name in free and tie.name.startswith(f"{name}_held"):  # the user's own is the user's
             spec.delete(tie)
+        elif off := np.abs(data.efc_pos[broken & (data.efc_id == i)]).tolist():
+            raise InputError(
+                f"equality {tie.name!r} of {tie.name1!r} is off by {max(off):.4g} where the robot is to stand: give a "
+                "--keyframe in which it is not, or take the equality out of the file"
+            )
     tie_names = {tie.name for tie in spec.equalities}
     held = [name for name in poses if name not in {*free, *on_servos, *ties}]
-    data = posed(model, pose)
     for name in held:
         kind = model.joint(name).type[0]
         if kind == mujoco.mjtJoint.mjJNT_FREE:

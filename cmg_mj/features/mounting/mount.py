@@ -258,5 +258,5 @@ def _mount_on_spec(spec: mujoco.MjSpec, path: Path, request: MountRequest) -> Mo
             write_keyframe(spec, model, name, as_qpos(model, poses_of(own.model, own.qpos) | gimbals), speeds, own)
     model = compile_model(spec, path)
     key = model.key(EQUILIBRIUM_KEY).id
-    check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]).line)
+    check_falls(model, key, find_axis(model, key, request.name, axis_modules(model)[request.name]))
     return MountedRobot(spec, path, tuple(held), tuple(notes))

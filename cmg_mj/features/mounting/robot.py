@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.checks import STEPS_S
 from cmg_mj.plant.elements import EQUILIBRIUM_KEY, axes_in, axis_modules, missing_elements
 from cmg_mj.plant.mjcf import compile_model, parse, posed
-from cmg_mj.plant.settings import NO_BATCH
+from cmg_mj.plant.settings import FLAGS_OFF
 from cmg_mj.plant.tilt_line import HingeLine
 
 BAD_CONNECTIONS = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
@@ -25,6 +26,8 @@ UNNAMED = "MuJoCo Model"
 FLOORS = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD
 NEEDED = ("constraint", "equality", "gravity", "actuation", "sensor")
 """Names in MJCF's <flag> of flags that must not be switched off."""
+MAX_ASLANT = 1e-3
+"""Gravity farther from straight down is no inaccuracy of the file [rad]."""
 MAX_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
 ITERATIONS, TOLERANCE = 100, 1e-8
@@ -59,9 +62,13 @@ def read_robot(robot: str | Path | mujoco.MjSpec) -> tuple[mujoco.MjSpec, Path]:
             raise InputError(
                 f'{path}: <flag {flag}="disable"/> switches off what a mounted pair needs; take it out of the file'
             )
-    if not spec.option.gravity[2] < 0.0:
-        gravity = " ".join(f"{part:g}" for part in spec.option.gravity)
-        raise InputError(f'{path}: <option gravity="{gravity}"/> does not pull down: there is nothing to balance')
+    x, y, z = spec.option.gravity
+    aslant = math.atan2(math.hypot(x, y), -z)
+    if aslant > MAX_ASLANT:
+        raise InputError(
+            f'{path}: <option gravity="{x:g} {y:g} {z:g}"/>: pulls {math.degrees(aslant):.3g} deg off straight down; '
+            "let it pull down, and turn the floor instead"
+        )
     _bake_masses(spec, model)
     _name_all(spec)
     for equality in spec.equalities:
@@ -115,7 +122,7 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
     option = spec.option
     gravity = np.asarray(option.gravity)
     down = [0.0, 0.0, -np.linalg.norm(gravity)]
-    if gravity.tolist() != down and np.linalg.norm(gravity[:2]) < 1e-3 * -gravity[2]:
+    if gravity.tolist() != down:
         notes.append(f"its gravity of {' '.join(f'{part:g}' for part in gravity)} is now straight down")
         option.gravity = down
     if option.integrator != mujoco.mjtIntegrator.mjINT_RK4:
@@ -125,9 +132,12 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
         option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         notes.append("its solver is now Newton: another does not hold joints stiffly")
     option.iterations, option.tolerance = max(option.iterations, ITERATIONS), min(option.tolerance, TOLERANCE)
-    if option.enableflags & NO_BATCH:
-        option.enableflags &= ~NO_BATCH
-        notes.append("its flags sleep and ipc are now off: worlds that are stepped together have neither")
+    if np.any(option.wind):
+        option.wind = np.zeros(3)
+        notes.append("its wind is now 0, against which it would lean")
+    if option.enableflags & FLAGS_OFF:
+        option.enableflags &= ~FLAGS_OFF
+        notes.append("its flags sleep, ipc and invdiscrete are now off: RK4 and worlds stepped together have them not")
     if option.timestep > MAX_STEP_S:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
         option.timestep = MAX_STEP_S

@@ -14,9 +14,10 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting.attach import place_modules
 from cmg_mj.features.mounting.hold import as_qpos, rest_controls
 from cmg_mj.features.mounting.request import MountRequest, Place
+from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.checks import TRUE_DEG
-from cmg_mj.plant.elements import subtree
-from cmg_mj.plant.mjcf import compile_model, posed
+from cmg_mj.plant.elements import ON_A_JOINT, subtree
+from cmg_mj.plant.mjcf import compile_model, data_at_keyframe, posed
 from cmg_mj.plant.tilt_line import UP, Line, SupportLine, turn_pose
 
 MAX_SETTLE_S = 10.0
@@ -128,8 +129,8 @@ def _touch_down(model: mujoco.MjModel, data: mujoco.MjData, tree: np.ndarray, he
             break
     else:
         raise InputError(
-            "the robot has nothing to stand on: no geom of the robot's collides with one of the world's; give it a "
-            'floor (<geom type="plane" size="5 5 0.1"/> in the worldbody), and let contacts be on'
+            "the robot has nothing to stand on: no geom of its collides with one of the world's; let them (contype, "
+            'conaffinity, <exclude>, <flag contact>), or give it a floor: <geom type="plane" size="5 5 0.1"/>'
         )
     free, touching = max(last, at), min(last, at)
     while free - touching > SEARCH_ERROR * step:
@@ -349,7 +350,8 @@ def _balanced(model: mujoco.MjModel, qpos: np.ndarray, joint: int, direction: np
     if model.jnt_limited[joint] and math.degrees(room) < STANDS_DEG:
         raise InputError(
             f"the hinge {name!r} would stand upright at {upright:.4g} rad, at the end of its range of {low:.4g} to "
-            f"{high:.4g} or beyond its range: widen the range, so that it can lean by {STANDS_DEG:g} deg either way"
+            f"{high:.4g}, less a margin of {model.jnt_margin[joint]:.4g}, or beyond its range: widen it, so that "
+            f"it can lean by {STANDS_DEG:g} deg either way"
         )
     qpos = qpos.copy()
     qpos[address] = upright
@@ -364,6 +366,10 @@ MAX_FALL_S = 3.0
 """Longest simulation; a robot whose tilt has not grown so much by then falls too slowly to judge, or stands [s]."""
 SLOWEST = math.acosh(UNTIL) / MAX_FALL_S
 """Slowest fall of a robot that a pair is mounted on [1/s]."""
+PUSHED_DEG = 0.5
+"""A robot that is pushed like gravity does at such a tilt does not stand upright; the bias that worlds have [deg]."""
+MAX_DRAG = 0.05
+"""Largest drag on a flywheel, of its motor's force at standstill."""
 FALL_TIME_CONSTANTS = 10.0
 """Time constants within which `TRIED_DEG` becomes `LEFT_DEG`; 6 on a rigid robot."""
 
@@ -402,18 +408,32 @@ def _let_go(model: mujoco.MjModel, key: int, line: Line, tilt: float) -> mujoco.
     return data
 
 
-def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
-    """Check that a robot falls, fast enough for a pair.
+def check_falls(model: mujoco.MjModel, key: int, axis: Axis) -> None:
+    """Check that gravity alone turns a robot about an axis, fast enough for a pair, and that its flywheels turn freely.
 
     Raises:
-        InputError: It stands by itself, or falls too slowly.
+        InputError: It is pushed where it should balance, stands by itself, or falls too slowly; or a fluid brakes.
     """
+    line, data = axis.line, data_at_keyframe(model, key)
+    push = float(line.motion(model, data) @ (data.qfrc_passive + data.qfrc_actuator))
+    lean = math.degrees(abs(push) / (axis.reduced.gimbals * axis.reduced.gravity_torque))
+    if lean > PUSHED_DEG:
+        raise InputError(
+            f"with its mass above the line a spring or an actuator pushes the robot by {push:.3g} N m, as "
+            f"much as gravity at {lean:.3g} deg: let that be nothing there (springref, biasprm, ctrl)"
+        )
+    for module in axis.modules:
+        drag, motor = abs(data.qfrc_passive[module.flywheel_dof]), model.actuator_gainprm[module.motor, 0]
+        if drag > MAX_DRAG * motor * abs(module.speed):
+            raise InputError(
+                f"<option density={model.opt.density:g} viscosity={model.opt.viscosity:g}>: the fluid brakes flywheels "
+                f"by {drag:.3g} N m, too much for their motors; air has a density of 1.2"
+            )
     pole = simulated_pole(model, key, line)
     if pole < SLOWEST:
         raise InputError(
             f"the robot falls too slowly from a tilt of {TRIED_DEG:g} deg, with {pole:.2g} 1/s; a pair is for robots "
-            f"that fall with {SLOWEST:.2g} 1/s or faster: it stands by itself, geoms that overlap hold it (let them "
-            "not collide: <exclude>), or its mass is far up (--position is in metres)"
+            f"that fall with {SLOWEST:.2g} 1/s or faster: {_holders(model, data, line)}"
         )
     for side in (TRIED_DEG, -TRIED_DEG) if isinstance(line, SupportLine) else ():
         data = _let_go(model, key, line, math.radians(side))
@@ -425,3 +445,22 @@ def check_falls(model: mujoco.MjModel, key: int, line: Line) -> None:
                     f"{LEFT_DEG:g} deg of there after {data.time:.2g} s, as on the edge of a flat foot; take away what "
                     "it comes to rest on"
                 )
+
+
+def _holders(model: mujoco.MjModel, data: mujoco.MjData, line: Line) -> str:
+    """Say what may keep a robot from falling, as far as its model has it."""
+    driven = np.isin(model.actuator_trntype, ON_A_JOINT) & (model.actuator_trnid[:, 0] == line.joint)
+    found = {
+        "the joint's frictionloss": model.dof_frictionloss[line.push[0]],
+        "the joint's spring": model.jnt_stiffness[line.joint],
+        "an actuator of the joint": model.actuator_biasprm[driven],
+        "an equality of the joint": (model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj1id == line.joint),
+        "a tendon": np.append(model.tendon_stiffness, model.tendon_limited),
+        "rolling friction (condim 6)": [contact.dim > 4 for contact in data.contact[: data.ncon]],
+    }
+    if holders := [what for what, values in found.items() if np.any(values)]:
+        return f"{' or '.join(holders)} holds it; take that out of the file"
+    return (
+        "it stands by itself, geoms that overlap hold it (let them not collide: <exclude>), or its mass is far up "
+        "(--position is in metres)"
+    )

@@ -17,6 +17,7 @@ from cmg_mj.features.mounting.report import _advice
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import axis_modules
 from cmg_mj.plant.plant import load_plant
+from cmg_mj.plant.settings import FLAGS_OFF
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
@@ -198,6 +199,17 @@ MOVES = "rests on the body '{}', which moves: let the two not collide"
             {},
             "--body trunk: has no mass of its own; the bodies with mass on it: link",
         ),
+        (
+            trunk().replace("<option", '<option density="1000"'),
+            {},
+            "<option density=1000 viscosity=0>: the fluid brakes",
+        ),
+        (
+            trunk(before='<default><geom condim="6" friction="1 1 1"/></default>'),
+            {},
+            r"falls too slowly .*: rolling friction \(condim 6\) holds it",
+        ),
+        (trunk(after='<contact><exclude body1="world" body2="trunk"/></contact>'), {}, "conaffinity, <exclude>"),
         (trunk(), {"body": "base"}, "--body base: no such body"),
         (
             trunk(more='<geom size="0.1" pos="3 0 0"/>'),
@@ -210,6 +222,46 @@ def test_refused_by_the_true_reason(text: str, options: dict[str, Any], message:
     with pytest.raises(InputError, match=message) as info:
         put(text, **options)
     assert "\n" not in str(info.value)
+
+
+PUSHED = "above the line a spring or an actuator pushes the robot by {} N m, as much as gravity at"
+HELD = "falls too slowly from .*: {} holds it; take that out of the file"
+HINGED = """
+<mujoco><option timestep="0.002"/><worldbody>{more}
+  <body name="trunk" pos="0 0 1"><joint name="h" axis="0 1 0" {joint}/>
+    <geom type="box" size=".05 .05 .2" pos="{x} 0 .2" mass="5"/><site name="top" pos="0 0 0.4"/>
+  </body></worldbody>{after}
+</mujoco>
+"""
+SERVO = '<actuator><position joint="h" kp="100"/></actuator>'
+GUY = '<tendon><spatial stiffness="2e3"><site site="top"/><site site="{}"/></spatial></tendon>'
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"joint": 'stiffness="15" springref="20"'}, PUSHED.format("5.24")),
+        ({"joint": 'stiffness="3" springref="-60"'}, PUSHED.format("-3.14")),
+        ({"joint": 'stiffness="10"', "x": 0.08}, PUSHED.format("3.81")),
+        (
+            {"after": '<actuator><general joint="h" biastype="affine" biasprm="4 0 0"/></actuator>'},
+            PUSHED.format(4),
+        ),
+        ({"joint": 'stiffness="60"'}, HELD.format("the joint's spring")),
+        ({"joint": 'frictionloss="0.5"'}, HELD.format("the joint's frictionloss")),
+        ({"after": SERVO}, HELD.format("an actuator of the joint")),
+        ({"more": '<site name="at" pos="1 0 1.4"/>', "after": GUY.format("at")}, HELD.format("a tendon")),
+        ({"joint": 'stiffness="15"', "after": '<actuator><motor joint="h"/></actuator>'}, ""),
+    ],
+)
+def test_what_pushes_or_holds_a_hinge_is_named(fields: dict[str, Any], message: str) -> None:
+    """By hand: the torque of a spring is k (springref - q), of 20 deg, or of q = -atan(0.08/0.2)."""
+    text = HINGED.format(**({"joint": "", "x": 0, "more": "", "after": ""} | fields))
+    if not message:
+        put(text, scale=1.0)
+        return
+    with pytest.raises(InputError, match=message):
+        put(text, scale=1.0)
 
 
 @pytest.mark.parametrize(
@@ -261,18 +313,24 @@ def test_a_keyframe_is_kept_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    "option", ['actuatorgroupdisable="0 3"', "><flag sleep='enable'/></option", "><flag ipc='enable'/></option"]
+    ("option", "flags"),
+    [
+        ('actuatorgroupdisable="0 3"', ""),
+        ('density="1.2" wind="5 0 0"', ""),
+        ("", "sleep='enable'"),
+        ('integrator="discrete" solver="CG"', "ipc='enable'"),
+        ("", "fwdinv='enable' invdiscrete='enable'"),
+    ],
 )
-def test_the_pair_works_whatever_the_file_switches(option: str) -> None:
-    """Groups of actuators that are off, and flags that many worlds at once do not know."""
-    option = option.replace("><flag ipc", ' integrator="discrete" solver="CG"><flag ipc')
-    text = trunk().replace('timestep="0.002"/', f'timestep="0.002" {option}' + "/" * (option[-1] == '"'))
+def test_the_pair_works_whatever_the_file_switches(option: str, flags: str) -> None:
+    """Groups of actuators that are off, wind, and flags that RK4 or many worlds at once do not know."""
+    text = trunk().replace('timestep="0.002"/', f'timestep="0.002" {option}><flag {flags}/></option')
     Path("robot.xml").write_text(text, encoding="utf-8")
     command = ("mount", "robot.xml", "--body", "trunk", "--scale", "1.2", "-o", "pair.xml", "--quick")
     assert cmg_mj(*command).status == 0
     stood = prepare(load_scenario("pair.toml", ["push=[]", "duration_s=3"])).run_many(2, keep_trajectory=False).stood
     assert stood.all()
-    assert not load_plant(model="pair.xml").model.opt.enableflags
+    assert not load_plant(model="pair.xml").model.opt.enableflags & FLAGS_OFF
 
 
 def test_flags_of_a_file_by_hand_are_off_in_every_run() -> None:

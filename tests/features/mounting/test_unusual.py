@@ -35,6 +35,8 @@ TRUNK = """
 </mujoco>
 """
 NECK = '<joint name="neck" axis="0 1 0"/>'
+TENDON = '<tendon><fixed name="t"><joint joint="neck" coef="1"/></fixed></tendon>'
+EQUAL = "<equality>{}</equality>"
 BENT_KEYFRAME = '<keyframe><key name="bent" qpos="0 0.3"/></keyframe>'
 UPRIGHT = """
 <mujoco>
@@ -193,14 +195,29 @@ def test_what_only_drives_a_joint_does_not_hold_it(drive: str) -> None:
         (
             {"joint": NECK, "after": '<equality><joint name="e" joint1="neck" polycoef="0.2 0 0 0 0"/></equality>'},
             {},
-            "equality 'e' holds the joint 'neck' at 0.2, and the robot is to stand with it at 0",
+            "equality 'e' of 'neck' is off by 0.2 where the robot is to stand: give a --keyframe",
+        ),
+        (
+            {"joint": NECK, "after": TENDON + EQUAL.format('<tendon name="e" tendon1="t" polycoef="-0.3 0 0 0 0"/>')},
+            {},
+            "equality 'e' of 't' is off by 0.3 where",
+        ),
+        (
+            {
+                "joint": NECK + '<joint name="nod" axis="1 0 0"/>',
+                "after": EQUAL.format('<joint name="e" joint1="neck" joint2="nod" polycoef="0.1 1 0 0 0"/>'),
+            },
+            {},
+            "equality 'e' of 'neck' is off by 0.1 where",
         ),
         (
             {"after": '<equality><joint name="e" joint1="hip"/></equality>'},
             {},
-            "falls too slowly from a tilt of 0.05 deg, with 0 1/s; .*: it stands by itself",
+            "falls too slowly from a tilt of 0.05 deg, with 0 1/s; .*: an equality of the joint holds it",
         ),
-        ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/> does not pull down: there is nothing to balance'),
+        ({"option": 'gravity="0 0 9.81"'}, {}, 'gravity="0 0 9.81"/>: pulls 180 deg off straight down'),
+        ({"option": 'gravity="0 0 0"'}, {}, 'gravity="0 0 0"/>: pulls 180 deg off straight down'),
+        ({"option": 'gravity="0.5 0 -9.8"'}, {}, 'gravity="0.5 0 -9.8"/>: pulls 2.92 deg off straight down'),
     ],
 )
 def test_refused_in_one_line(changes: dict[str, str], options: dict[str, Any], message: str) -> None:
