@@ -126,15 +126,15 @@ class FreePivot(GyroFree):
         gate: Square of an innovation by its variance, above which the excess is put down to the pivot.
     """
 
-    pivot_hz: Positive = 11.0
-    slow_hz: Positive = 0.8
-    odds_s: Positive = 0.065
-    odds_alike: NonNegative = 1.2
+    pivot_hz: Positive = 9.5
+    slow_hz: Positive = 0.7
+    odds_s: Positive = 0.07
+    odds_alike: NonNegative = 1.4
     pivot_start: NonNegative = 2.3e-3
     pivot_floor: NonNegative = 1e-3
     pivot_s: Positive = 0.6
     learn_s: Positive = 0.02
-    innovation_weight: NonNegative = 0.9
+    innovation_weight: NonNegative = 0.75
     slow_innovation_weight: NonNegative = 3.7
     noise_s: Positive = 0.22
     rise_factor: NonNegative = 29.0
