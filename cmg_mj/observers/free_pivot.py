@@ -240,23 +240,10 @@ class FreePivot(GyroFree):
         pp, pz, zz = inflate * pp, inflate * pz, inflate * zz
 
         r, rz, rb, rw, rm = p + z, pz + zz, pb + zb, pw + zw, pm + zm
-        return Band(
-            p=r + alpha,
-            z=z + alpha,
-            b=b,
-            w=f * w,
-            pp=pp + pz + rz + mm - 2.0 * rm,
-            pz=rz + mm - zm - rm,
-            pb=rb - bm,
-            pw=f * (rw - wm),
-            zz=zz + mm - 2.0 * zm,
-            zb=zb - bm,
-            zw=f * (zw - wm),
-            bb=bb + h**5 * self.bias_walk**2,
-            bw=f * bw,
-            ww=f * f * (ww - pivot) + pivot,
-            pivot=pivot,
-        )
+        of_p = pp + pz + rz + mm - 2.0 * rm, rz + mm - zm - rm, rb - bm, f * (rw - wm)
+        of_z = zz + mm - 2.0 * zm, zb - bm, f * (zw - wm)
+        of_b = bb + h**5 * self.bias_walk**2, f * bw
+        return Band(r + alpha, z + alpha, b, f * w, *of_p, *of_z, *of_b, f * f * (ww - pivot) + pivot, pivot)
 
     @cached_property
     def _fades(self) -> tuple[float, float, float]:

@@ -38,8 +38,8 @@ VARIANTS: list[dict[str, float]] = [
     {"innovation_weight": 0.0},
     {"learn_s": 0.5},
     {"pivot_s": 1.0},
-    {"pivot_hz": 2.0},
-    {"pivot_hz": 10.0},
+    {"odds_alike": 1e6},  # the fast filter alone
+    {"slow_hz": 3.0},
 ]
 
 

@@ -65,7 +65,7 @@ class ByMatrices:
         self.x, self.P = self.F @ x + drive * a, self.F @ P @ self.F.T + 0.1**2 * np.outer(drive, drive)
         self.P[2, 2] += 0.01**2 * DT
         self.P[3, 3] += (1.0 - self.fade**2) * self.S
-        return estimate, e**2 / ee, ee
+        return estimate, float(e**2 / ee), float(ee)
 
 
 DEFAULT = free_pivot()

@@ -12,6 +12,8 @@ import pytest
 
 SCRIPT = Path(__file__).resolve().parents[2] / "docs/studies/free_pivot_motions.py"
 DAILY = ("turn 0.25", "impact 2", "knocks 10, 10 ms")
+BEFORE = {"walk 2": 0.88, "walk 1, no strikes": 0.98, "bus 0.2": 0.96, "sine 2 Hz, 0.5": 0.83}
+"""Where `free_pivot` of version 0.2.0 was better than the bank: its error by the bank's, of 200 worlds."""
 
 pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="a source distribution has no studies")
 
@@ -27,29 +29,29 @@ def study() -> Any:
     return sys.modules[SCRIPT.stem]
 
 
-def motions() -> list[Any]:
-    """Every motion, most of them slow."""
-    names = study().MOTIONS if SCRIPT.exists() else ()
-    late = pytest.mark.xfail(reason="on this seed it learns late of the pivot: 1.45 of the bank's error", strict=True)
-    marks = {name: () if name in DAILY else (pytest.mark.slow,) for name in names} | {
-        "walk 0.5": (late, pytest.mark.slow)
-    }
-    return [pytest.param(name, marks=marks[name]) for name in names]
-
-
 def error(estimate: np.ndarray, rate: np.ndarray) -> float:
     """Mean RMS error of all worlds [rad/s]."""
     return float(np.sqrt(np.square(estimate - rate).mean(axis=0)).mean())
 
 
-@pytest.mark.parametrize("name", motions())
-def test_on_each_motion_it_is_near_the_bank(name: str) -> None:
-    """Within 1.1 but for brakes and hands (docs/real_rigs_evidence.md), which have 1.2; the rest is chance."""
+def by_the_bank(name: str, worlds: int) -> float:
+    """Error of `free_pivot` by the bank's."""
     work = study()
     rig = work.known_rig()
-    recording = work.record(rig, name, 12, 910_000)
-    ours, theirs = (
-        error(work.estimated(observer, recording), recording.rate)
-        for observer in (work.FreePivot(work.DT, rig.model, rig.noise), work.Bank(rig))
-    )
-    assert ours < (1.3 if name.startswith(("brake", "hand")) else 1.15) * theirs
+    recording = work.record(rig, name, worlds, 940_000)
+    observers = work.FreePivot(work.DT, rig.model, rig.noise), work.Bank(rig)
+    ours, theirs = (error(work.estimated(each, recording), recording.rate) for each in observers)
+    return ours / theirs
+
+
+@pytest.mark.parametrize("name", DAILY)
+def test_it_is_near_the_bank(name: str) -> None:
+    """Twelve worlds: what exceeds 1.1 is chance."""
+    assert by_the_bank(name, 12) < 1.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", study().MOTIONS if SCRIPT.exists() else ())
+def test_on_each_motion_it_is_within_a_tenth_of_the_better_of_two(name: str) -> None:
+    """Of the bank and of itself before it had a gate and a slow filter, on worlds that it was not tuned on."""
+    assert by_the_bank(name, 40) < 1.1 * BEFORE.get(name, 1.0)
