@@ -172,15 +172,23 @@ ERROR = "velocity_rms_error_rad_s"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("setting", "most"), [("sensors.accelerometer.bias_mg=[0.0,5.0]", 1.2), (PIVOT, 2.38)])
-def test_after_a_second_it_has_settled_as_far_as_it_can(setting: str, most: float) -> None:
-    """On a pivot of 0.5 m/s^2 by the bound of docs/studies/free_pivot_grid.py, which exceeds 1.2 itself."""
+def test_after_a_second_it_has_settled_as_far_as_it_can() -> None:
+    """Errors from 1 to 1.5 s by the settled one, and by that of the filter that knows the pivot's motion: 0.0731 rad/s.
+
+    The latter is the bound's early error in docs/studies/free_pivot_grid.py.
+    """
+    offset, moving = (early_and_late(setting) for setting in ("sensors.accelerometer.bias_mg=[0.0,5.0]", PIVOT))
+    assert offset[0] < 1.2 * offset[1]
+    assert moving[0] < 1.4 * 0.0731
+
+
+def early_and_late(setting: str) -> list[float]:
+    """RMS errors from 1 to 1.5 s, and from 8 s on [rad/s]."""
     result = push_recovery("seed=160000", "controller.feedback=truth", setting, observer="free_pivot").run_many(24)
     t = recorded(result)
     assert result.stood.all()
     time, squares = t["time_s"], np.square(t["estimate/free_pivot/x2_rad_s"] - t["x2_rad_s"])
-    early, late = (squares[part].mean() for part in ((time >= 1.0) & (time < 1.5), time >= 8.0))
-    assert math.sqrt(early / late) < most
+    return [math.sqrt(squares[part].mean()) for part in ((time >= 1.0) & (time < 1.5), time >= 8.0)]
 
 
 @pytest.mark.slow
