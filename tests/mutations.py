@@ -111,8 +111,9 @@ MUTATIONS = [
             f"free_pivot: {name}", OBSERVERS + "free_pivot.py", rf"\n    {name}: \w[^=\n]*(?:=1.0[^=\n]*)? = " + NUMBER
         )
         for name in (
-            *("pivot_hz", "pivot_start", "pivot_floor", "pivot_s"),  # the others are those of gyro_free
-            *("learn_s", "innovation_weight", "noise_s", "rise_factor", "covariance_boost", "inflation", "gate"),
+            *("pivot_hz", "slow_hz", "odds_s", "odds_alike", "pivot_start", "pivot_floor", "pivot_s", "learn_s"),
+            *("innovation_weight", "slow_innovation_weight", "noise_s"),
+            *("rise_factor", "covariance_boost", "inflation", "gate"),  # the others are those of gyro_free
         )
     ),
     Mutation("super_twisting: L", OBSERVERS + "linear.py", r"    L: Positive = " + NUMBER),

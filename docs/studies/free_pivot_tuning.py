@@ -33,15 +33,13 @@ FALLS = "pivot 0.5 m/s2 to 1 Hz"
 VARIANTS: list[dict[str, float]] = [
     {},
     {"gate": 1e9},
-    {"inflation": 0.0},
     {"covariance_boost": 0.0},
     {"rise_factor": 0.0},
-    {"innovation_weight": 2.0},
+    {"innovation_weight": 0.0},
     {"learn_s": 0.5},
-    {"pivot_s": 0.5},
-    {"bias_start": 0.35},
-    {"pivot_hz": 3.0},
-    {"pivot_hz": 8.0},
+    {"pivot_s": 1.0},
+    {"odds_alike": 1e6},  # the fast filter alone
+    {"slow_hz": 3.0},
 ]
 
 

@@ -159,7 +159,15 @@ def positive_gains() -> list[tuple[str, str]]:
     may_be_zero = {("high_gain", "d_inf"), ("gyro_free", "bias_walk"), ("gyro_free", "jerk")}
     may_be_zero |= {("free_pivot", name) for name in ("bias_walk", "jerk", "pivot_start", "pivot_floor")}
     may_be_zero |= {
-        ("free_pivot", name) for name in ("innovation_weight", "rise_factor", "covariance_boost", "inflation")
+        ("free_pivot", name)
+        for name in (
+            "innovation_weight",
+            "slow_innovation_weight",
+            "rise_factor",
+            "covariance_boost",
+            "inflation",
+            "odds_alike",
+        )
     }
     return [gain for gain in result if gain not in may_be_zero]
 

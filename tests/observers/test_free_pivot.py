@@ -25,48 +25,70 @@ def test_while_the_pivot_rests_it_is_gyro_free() -> None:
     x1, _, alpha, y1, a = motion(400, np.random.default_rng(1), bias=0.3)
     y1, a = x1 + 0.5 * (y1 - x1), alpha + 0.3 + 0.5 * (a - alpha - 0.3)
     estimates, states = run(free_pivot(pivot_start=0.0, pivot_floor=0.0), y1, a=a)
-    expected, _ = run(gyro_free(bias_start=0.5), y1, a=a)
+    expected, _ = run(gyro_free(), y1, a=a)
     assert max(state.scale for state in states) <= 1.0
     np.testing.assert_allclose(estimates, expected, rtol=0.0, atol=1e-12)
 
 
-def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Estimates of x1, x2 and the learnt S of the samples after the first, in rad and seconds, by textbook matrices.
+class ByMatrices:
+    """One of the two filters in rad and seconds, by textbook matrices: states are p, z, b, w and the sample's n."""
 
-    States are p, z, b, w and the sample's n. The numbers are the defaults. Also: how often the gate
-    opened.
-    """
-    f, d, H = math.exp(-2.0 * math.pi * 5.0 * DT), DT**2 / 6.0, np.array([1.0, 0.0, -(DT**2) / 6.0, 1.0, 0.0])
-    H[4] = C - d
-    F = np.diag([1.0, 1.0, 1.0, f, 0.0])
-    F[:2, 1:] = [[DT, -(DT**2), 0.0, -(DT**2)], [1.0, -DT, 0.0, -DT]]
-    drive = np.array([DT**2, DT, 0.0, 0.0, 0.0])
-    x, P = np.array([y1[0] - d * a[0], 0.0, 0.0, 0.0, 0.0]), np.diag([1.0, 0.02**2, 0.5**2, 0.002**2, 0.0])
-    r, S, share, bends = 1.0, 0.002**2, DT / 0.05, np.diff(np.append([y1[0]] * 2, y1), 2)
-    rows, variances, opened = [], [], 0
-    for k in range(len(y1)):
-        r += DT / 0.3 * (bends[k] ** 2 / (6.0 * NOISE.tilt**2) - r)
-        P[4, 4] = max(r, 1.0) * NOISE.acceleration**2
-        e, own = y1[k] - d * a[k] - H @ x, max(r, 1.0) * INDEPENDENT**2
-        if e**2 > 11.5 * (H @ P @ H + own):
+    def __init__(self, hz: float, weight: float, y1: float, a: float) -> None:
+        f, d = math.exp(-2.0 * math.pi * hz * DT), DT**2 / 6.0
+        self.weight, self.fade = weight, f
+        self.H = np.array([1.0, 0.0, -d, 1.0, C - d])
+        self.F = np.diag([1.0, 1.0, 1.0, f, 0.0])
+        self.F[:2, 1:] = [[DT, -(DT**2), 0.0, -(DT**2)], [1.0, -DT, 0.0, -DT]]
+        self.x, self.S = np.array([y1 - d * a, 0.0, 0.0, 0.0, 0.0]), DEFAULT.pivot_start**2
+        self.P = np.diag([1.0, 0.02**2, DEFAULT.bias_start**2, self.S, 0.0])
+        self.opened = 0
+
+    def sample(self, y1: float, a: float, r: float, share: float) -> tuple[np.ndarray, float, float]:
+        """Take a sample, and return x1, x2 of it, the innovation's square over its variance, and the latter."""
+        x, P, H, own = self.x, self.P, self.H, r * INDEPENDENT**2
+        P[4, 4] = r * NOISE.acceleration**2
+        e = y1 - DT**2 / 6.0 * a - H @ x
+        if e**2 > DEFAULT.gate * (H @ P @ H + own):
             P[3, 3] += e**2 - H @ P @ H - own
-            opened += 1
+            self.opened += 1
         ee = H @ P @ H + own
         K = P @ H / ee
         x, P = x + K * e, P - np.outer(K, H @ P)
-        alpha = a[k] - x[2] - x[4]
-        rows.append((x[0] + d * alpha, x[1] + 0.5 * DT * alpha))
-        rise = share * (x[3] ** 2 + P[3, 3] - S + 4.0 * S * (e**2 / ee - 1.0))
+        alpha = a - x[2] - x[4]
+        estimate = np.array([x[0] + DT**2 / 6.0 * alpha, x[1] + 0.5 * DT * alpha])
+        rise = share * (x[3] ** 2 + P[3, 3] - self.S + self.weight * self.S * (e**2 / ee - 1.0))
         early = share * max(rise, 0.0)
-        S = max(S + rise + 60.0 * early, 0.001**2)
-        P += 10.0 * early * np.outer([1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, -1.0, 0.0])
-        P[:2, :2] *= 1.0 + 10.0 * early / (S + NOISE.tilt**2)
-        share = max(share / (1.0 + share), DT / 1.0)
-        x, P = F @ x + drive * a[k], F @ P @ F.T + 0.1**2 * np.outer(drive, drive)
-        P[2, 2] += 0.01**2 * DT
-        P[3, 3] += (1.0 - f * f) * S
-        variances.append(S)
-    return np.array(rows[1:]), np.array(variances[1:]), opened
+        self.S = max(self.S + rise + DEFAULT.rise_factor * early, DEFAULT.pivot_floor**2)
+        apart, drive = np.array([1.0, 0.0, 0.0, -1.0, 0.0]), np.array([DT**2, DT, 0.0, 0.0, 0.0])
+        P += DEFAULT.covariance_boost * early * np.outer(apart, apart)
+        P[:2, :2] *= 1.0 + DEFAULT.inflation * early / (self.S + NOISE.tilt**2)
+        self.x, self.P = self.F @ x + drive * a, self.F @ P @ self.F.T + 0.1**2 * np.outer(drive, drive)
+        self.P[2, 2] += 0.01**2 * DT
+        self.P[3, 3] += (1.0 - self.fade**2) * self.S
+        return estimate, float(e**2 / ee), float(ee)
+
+
+DEFAULT = free_pivot()
+
+
+def by_matrices(y1: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Estimates of x1, x2 and what both filters learn of S, after the first sample, and how often a gate opened."""
+    filters = [
+        ByMatrices(DEFAULT.pivot_hz, DEFAULT.innovation_weight, y1[0], a[0]),
+        ByMatrices(DEFAULT.slow_hz, DEFAULT.slow_innovation_weight, y1[0], a[0]),
+    ]
+    r, share, odds, bends = 1.0, DT / DEFAULT.learn_s, 0.0, np.diff(np.append([y1[0]] * 2, y1), 2)
+    rows, variances = [], []
+    for k in range(len(y1)):
+        r += DT / DEFAULT.noise_s * (bends[k] ** 2 / (6.0 * NOISE.tilt**2) - r)
+        (fast, e1, ee1), (slow, e2, ee2) = (each.sample(y1[k], a[k], max(r, 1.0), share) for each in filters)
+        odds = math.exp(-DT / DEFAULT.odds_s) * odds + (e2 - e1) / 2.0 + (ee2 / ee1 - 1.0) / (ee2 / ee1 + 1.0)
+        q = DEFAULT.odds_alike + odds
+        g = (1.0 + q / math.hypot(2.0, q)) / 2.0
+        rows.append(g * fast + (1.0 - g) * slow)
+        share = max(share / (1.0 + share), DT / DEFAULT.pivot_s)
+        variances.append([each.S for each in filters])
+    return np.array(rows[1:]), np.array(variances[1:]), sum(each.opened for each in filters)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.03])
@@ -79,7 +101,8 @@ def test_it_is_its_equations_in_matrices(sigma: float) -> None:
     estimates, states = run(free_pivot(), y1, a=a)
     expected, variances, opened = by_matrices(y1, a)
     np.testing.assert_allclose(estimates[:, :2], expected, rtol=1e-7, atol=1e-10)
-    np.testing.assert_allclose([state.pivot for state in states[1:]], variances, rtol=1e-7)
+    learnt = [(state.fast.pivot, state.slow.pivot) for state in states[1:]]
+    np.testing.assert_allclose(learnt, variances, rtol=1e-7)
     assert opened >= 2
 
 
@@ -100,7 +123,7 @@ def test_it_learns_how_strongly_the_pivot_moves(hz: float) -> None:
     rng = np.random.default_rng(3)
     *_, y1, a = motion(1600, rng, bias=0.2)
     at_rest, moving = (
-        math.sqrt(np.mean([state.pivot for state in run(free_pivot(), y1 + w, a=a)[1][600:]]))
+        math.sqrt(np.mean([state.fast.pivot for state in run(free_pivot(), y1 + w, a=a)[1][600:]]))
         for w in (np.zeros(1600), shares_of_y1(1600, 0.05, hz, rng))
     )
     assert at_rest < 0.005
@@ -110,15 +133,15 @@ def test_it_learns_how_strongly_the_pivot_moves(hz: float) -> None:
 def test_without_noise_the_expected_motion_falls_to_its_floor() -> None:
     """0.01 m/s^2, a fifth of the weakest motion of the grid."""
     _, states = run(free_pivot(), np.zeros(300), a=0.0)
-    assert 9.81 * math.sqrt(states[-1].pivot) == pytest.approx(0.01, rel=0.05)
+    assert 9.81 * math.sqrt(states[-1].fast.pivot) == pytest.approx(0.01, rel=0.05)
 
 
 def test_it_does_not_take_vibration_for_the_pivots_motion() -> None:
-    """Noise of thrice the datasheet's has nine times its variance."""
+    """Noise of thrice the datasheet's has nine times its variance; a third of it at most passes for motion."""
     x1, _, alpha, y1, a = motion(1600, np.random.default_rng(4), bias=0.0)
     _, states = run(free_pivot(), x1 + 3.0 * (y1 - x1), a=alpha + 3.0 * (a - alpha))
     assert np.mean([state.scale for state in states[400:]]) == pytest.approx(9.0, rel=0.2)
-    assert math.sqrt(np.mean([state.pivot for state in states[400:]])) < 0.01
+    assert np.mean([state.fast.pivot for state in states[400:]]) < (3.0 * NOISE.tilt) ** 2 / 3.0
 
 
 def knocks(acceleration: float, seconds: float) -> str:
@@ -149,15 +172,23 @@ ERROR = "velocity_rms_error_rad_s"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("setting", "most"), [("sensors.accelerometer.bias_mg=[0.0,5.0]", 1.2), (PIVOT, 2.38)])
-def test_after_a_second_it_has_settled_as_far_as_it_can(setting: str, most: float) -> None:
-    """On a pivot of 0.5 m/s^2 by the bound of docs/studies/free_pivot_grid.py, which exceeds 1.2 itself."""
+def test_after_a_second_it_has_settled_as_far_as_it_can() -> None:
+    """Errors from 1 to 1.5 s by the settled one, and by that of the filter that knows the pivot's motion: 0.0731 rad/s.
+
+    The latter is the bound's early error in docs/studies/free_pivot_grid.py.
+    """
+    offset, moving = (early_and_late(setting) for setting in ("sensors.accelerometer.bias_mg=[0.0,5.0]", PIVOT))
+    assert offset[0] < 1.2 * offset[1]
+    assert moving[0] < 1.4 * 0.0731
+
+
+def early_and_late(setting: str) -> list[float]:
+    """RMS errors from 1 to 1.5 s, and from 8 s on [rad/s]."""
     result = push_recovery("seed=160000", "controller.feedback=truth", setting, observer="free_pivot").run_many(24)
     t = recorded(result)
     assert result.stood.all()
     time, squares = t["time_s"], np.square(t["estimate/free_pivot/x2_rad_s"] - t["x2_rad_s"])
-    early, late = (squares[part].mean() for part in ((time >= 1.0) & (time < 1.5), time >= 8.0))
-    assert math.sqrt(early / late) < most
+    return [math.sqrt(squares[part].mean()) for part in ((time >= 1.0) & (time < 1.5), time >= 8.0)]
 
 
 @pytest.mark.slow

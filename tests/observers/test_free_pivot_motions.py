@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 SCRIPT = Path(__file__).resolve().parents[2] / "docs/studies/free_pivot_motions.py"
-FARTHER = {"brake": 1.6, "turn": 1.35, "hand": 1.35}
-"""Kinds of motion on which its error may be so many times the bank's."""
 DAILY = ("turn 0.25", "impact 2", "knocks 10, 10 ms")
+BEFORE = {"walk 2": 0.88, "walk 1, no strikes": 0.98, "bus 0.2": 0.96, "sine 2 Hz, 0.5": 0.83}
+"""Where `free_pivot` of version 0.2.0 was better than the bank: its error by the bank's, of 200 worlds."""
 
 pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="a source distribution has no studies")
 
@@ -29,26 +29,31 @@ def study() -> Any:
     return sys.modules[SCRIPT.stem]
 
 
-def motions() -> list[Any]:
-    """Every motion, most of them slow."""
-    names = study().MOTIONS if SCRIPT.exists() else ()
-    marks = {name: () if name in DAILY else (pytest.mark.slow,) for name in names}
-    return [pytest.param(name, marks=marks[name]) for name in names]
-
-
-def error(estimate: np.ndarray, rate: np.ndarray) -> float:
-    """Mean RMS error of all worlds [rad/s]."""
-    return float(np.sqrt(np.square(estimate - rate).mean(axis=0)).mean())
-
-
-@pytest.mark.parametrize("name", motions())
-def test_on_each_motion_it_is_near_the_bank(name: str) -> None:
-    """Within 1.1 but for long pushes to one side and slow shaking (docs/real_rigs_evidence.md); the rest is chance."""
+def by_the_bank(name: str, worlds: int) -> tuple[float, float]:
+    """Error of `free_pivot` by the bank's, of the mean world, and its standard error."""
     work = study()
     rig = work.known_rig()
-    recording = work.record(rig, name, 12, 910_000)
+    recording = work.record(rig, name, worlds, 960_000)
+    observers = work.FreePivot(work.DT, rig.model, rig.noise), work.Bank(rig)
     ours, theirs = (
-        error(work.estimated(observer, recording), recording.rate)
-        for observer in (work.FreePivot(work.DT, rig.model, rig.noise), work.Bank(rig))
+        np.sqrt(np.square(work.estimated(each, recording) - recording.rate).mean(axis=0)) for each in observers
     )
-    assert ours < FARTHER.get(name.partition(" ")[0], 1.15) * theirs
+    ratio = float(ours.mean() / theirs.mean())
+    return ratio, float((ours - ratio * theirs).std(ddof=1) / theirs.mean() / np.sqrt(len(ours)))
+
+
+@pytest.mark.parametrize(
+    ("name", "worlds"),
+    [
+        *((name, 24) for name in DAILY),
+        *(pytest.param(name, 40, marks=pytest.mark.slow) for name in (study().MOTIONS if SCRIPT.exists() else ())),
+    ],
+)
+def test_it_is_within_a_tenth_of_the_better_of_two(name: str, worlds: int) -> None:
+    """The bank and itself before it had a gate and a slow filter; two standard errors are chance.
+
+    Its numbers were chosen on other seeds.
+    """
+    ratio, chance = by_the_bank(name, worlds)
+    assert chance < 0.05
+    assert ratio - 2.0 * chance < 1.1 * BEFORE.get(name, 1.0)

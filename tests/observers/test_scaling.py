@@ -31,11 +31,10 @@ STAY: dict[str, dict[str, Unit]] = {
     "free_pivot": {
         **_PIVOT_FREE,
         **_TIMES,
-        "pivot_hz": Unit(-1),
-        **dict.fromkeys(
-            ("pivot_start", "pivot_floor", "innovation_weight", "rise_factor", "covariance_boost", "inflation", "gate"),
-            PURE,
-        ),
+        **dict.fromkeys(("pivot_hz", "slow_hz"), Unit(-1)),
+        "odds_s": Unit(1),
+        **dict.fromkeys(("odds_alike", "innovation_weight", "slow_innovation_weight", "gate"), PURE),
+        **dict.fromkeys(("pivot_start", "pivot_floor", "rise_factor", "covariance_boost", "inflation"), PURE),
     },
     "super_twisting": {"l0": PURE, "l1": PURE},
     "linear_high_gain": {"a1": PURE, "a2": PURE},
