@@ -57,8 +57,8 @@ def low_passed(rng: Rng, corner_hz: float) -> np.ndarray:
     w, early = 2.0 * math.pi * corner_hz, round(3.0 / corner_hz / DT)
     b, a = bilinear([w * w], [1.0, math.sqrt(2.0) * w, w * w], 1.0 / DT)
     n = 20 * early + 4000
-    impulse = lfilter(b, a, np.eye(1, n)[0])
-    return lfilter(b, a, rng.standard_normal(early + len(TIME)))[early:] / math.sqrt((impulse * impulse).sum())
+    impulse, noise = (np.asarray(lfilter(b, a, x)) for x in (np.eye(1, n)[0], rng.standard_normal(early + len(TIME))))
+    return noise[early:] / math.sqrt((impulse * impulse).sum())
 
 
 def tone(hz: float, phase: float) -> np.ndarray:
