@@ -131,7 +131,7 @@ class FreePivot(GyroFree):
     odds_s: Positive = 0.07
     odds_alike: NonNegative = 1.4
     pivot_start: NonNegative = 2.3e-3
-    pivot_floor: NonNegative = 1e-3
+    pivot_floor: NonNegative = 1.5e-3
     pivot_s: Positive = 0.6
     learn_s: Positive = 0.02
     innovation_weight: NonNegative = 0.75

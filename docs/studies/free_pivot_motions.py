@@ -7,7 +7,7 @@ as the reduced model with perfect servos; the law is fed the true rate, so that 
 The table has RMS errors over 15 s, the means of all worlds [1e-3 rad/s], `free_pivot` by the bank, and the worlds that
 fall with each in its own loop. The last rows are no such motions: a pivot at rest, stronger knocks, and noise.
 
-`free_pivot` was tuned on seeds 500000 and 700000 (docs/assumptions.md).
+`free_pivot` was tuned on seed 700000, with 900000 to 960000 in sight (docs/assumptions.md).
 
 The bank is an interacting multiple model estimator (H. A. P. Blom, Y. Bar-Shalom, "The interacting multiple model
 algorithm for systems with Markovian switching coefficients", IEEE Trans. Automatic Control 33(8), 1988): Kalman filters
