@@ -36,6 +36,7 @@ import os, pathlib, signal, time
 from cmg_mj.observers.linear import LinearDifferentiator
 
 class {name}(LinearDifferentiator):
+    elementwise = True
     def step(self, state, y, u):
         {what}
         return super().step(state, y, u)
