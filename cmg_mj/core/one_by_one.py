@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import logging
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -49,22 +48,18 @@ class OneByOne:
 
     def __init__(self, part: Any) -> None:
         self.stands_for = part
-        self._copies: dict[int, Any] = {}
+        self._copies: list[Any] = []
         self._result: Any = None
 
     def init(self, y: Measurement) -> States:
         """Return the state of each world at the first sample."""
-        self._copies = {world: copy.deepcopy(self.stands_for) for world in range(np.size(y.y1))}
-        return States(part.init(_of(y, world)) for world, part in self._copies.items())
+        self._copies = [copy.deepcopy(self.stands_for) for _ in range(np.size(y.y1))]
+        return States(part.init(_of(y, world)) for world, part in enumerate(self._copies))
 
     def step(self, states: States, *inputs: Any) -> tuple[States, Any]:
-        """Advance every world by a sample; one that fails has NaN from then on, which ends it.
-
-        Raises:
-            Exception: What the user's code raised before any world had a result, or in the last world.
-        """
+        """Advance every world by a sample."""
         after, results = States(states), [self._result] * len(states)
-        for world, part in [*self._copies.items()]:
+        for world, part in enumerate(self._copies):
             given = [_of(value, world) for value in inputs]
             try:
                 after[world], result = part.step(states[world], *given)
@@ -72,15 +67,10 @@ class OneByOne:
                 if shapes != {()}:
                     raise TypeError(f"step returned numbers of shapes {shapes}, not ()")
                 results[world], self._result = result, np.full(np.shape(result), math.nan)
-            except Exception as error:
-                running = math.isfinite(given[0].y1)  # one that has ended may bring NaN
-                if self._result is None or (running and len(self._copies) == 1):
+            except Exception:
+                if self._result is None or math.isfinite(given[0].y1):
                     raise
-                del self._copies[world]
-                results[world] = self._result
-                if running:
-                    what = f"{type(self.stands_for).__name__} failed in one of {len(states)} worlds"
-                    logging.getLogger("cmg_mj").warning("%s: %s: %s", what, type(error).__name__, error)
+                results[world] = self._result  # of a world that has ended, whose samples may be NaN
         if np.shape(self._result) == ():
             return after, np.array(results)
         return after, tuple(map(np.array, zip(*results, strict=True)))

@@ -293,23 +293,6 @@ def test_a_class_that_says_so_is_stepped_with_arrays() -> None:
         assert for_worlds(part) is part
 
 
-class FailsWhereItIsFar(Mine):
-    def step(self, state: Any, y: Measurement, u: Any) -> Any:
-        if y.y1 > math.radians(3.0):
-            raise ValueError("too far")
-        return super().step(state, y, u)
-
-
-def test_a_world_in_which_a_part_fails_ends_alone(caplog: pytest.LogCaptureFixture) -> None:
-    """Which it is does not depend on the others."""
-    experiment = with_part(FailsWhereItIsFar, "sensors.accelerometer.noise_density_ug_rthz=1000")
-    many = experiment.run_many(8)
-    fails = [experiment.run(world=world).outcomes[0].kind == "stopped" for world in range(8)]
-    assert 0 < sum(fails) < 8
-    assert [outcome.kind == "stopped" for outcome in many.outcomes] == fails
-    assert "FailsWhereItIsFar failed in one of 8 worlds: ValueError: too far" in caplog.text
-
-
 def test_no_law_gets_beyond_the_limit() -> None:
     """Its next sample tells the law what was commanded."""
     experiment = with_part(AsksForMuch)
