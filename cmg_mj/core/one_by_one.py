@@ -49,29 +49,32 @@ class OneByOne:
     def __init__(self, part: Any) -> None:
         self.stands_for = part
         self._copies: list[Any] = []
-        self._result: Any = None
+        self._lost: Any = None
 
     def init(self, y: Measurement) -> States:
         """Return the state of each world at the first sample."""
+        self._lost = None
         self._copies = [copy.deepcopy(self.stands_for) for _ in range(np.size(y.y1))]
         return States(part.init(_of(y, world)) for world, part in enumerate(self._copies))
 
     def step(self, states: States, *inputs: Any) -> tuple[States, Any]:
         """Advance every world by a sample."""
-        after, results = States(states), [self._result] * len(states)
+        after, results = States(states), [self._lost] * len(states)
         for world, part in enumerate(self._copies):
             given = [_of(value, world) for value in inputs]
             try:
                 after[world], result = part.step(states[world], *given)
-                shapes = {np.shape(number) for number in (result if isinstance(result, Sequence) else [result])}
-                if shapes != {()}:
-                    raise TypeError(f"step returned numbers of shapes {shapes}, not ()")
-                results[world], self._result = result, np.full(np.shape(result), math.nan)
+                if self._lost is None:
+                    shapes = {np.shape(number) for number in (result if isinstance(result, Sequence) else [result])}
+                    if shapes != {()}:
+                        raise TypeError(f"step returned numbers of shapes {shapes}, not ()")
+                    self._lost = np.full(np.shape(result), math.nan)
+                results[world] = result
             except Exception:
-                if self._result is None or math.isfinite(given[0].y1):
+                if self._lost is None or math.isfinite(given[0].y1):
                     raise
-                results[world] = self._result  # of a world that has ended, whose samples may be NaN
-        if np.shape(self._result) == ():
+                results[world] = self._lost  # of a world that has ended, whose samples may be NaN
+        if np.shape(self._lost) == ():
             return after, np.array(results)
         return after, tuple(map(np.array, zip(*results, strict=True)))
 

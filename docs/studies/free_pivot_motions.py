@@ -37,7 +37,7 @@ from cmg_mj.scenario.loading import load_scenario
 DT, DURATION = 0.005, 15.0
 TIME = DT * np.arange(round(DURATION / DT))
 SIGMA = 400e-6 * 9.81 * math.sqrt(100.0)
-"""Of one sample of an accelerometer [m/s^2]."""
+"""Standard deviation of a sample of an accelerometer [m/s^2]."""
 BIAS, START, FALLEN, RATE_LIMIT = math.radians(0.5), math.radians(1.0), math.radians(30.0), 4.7
 SHARES = [(s, 5.0) for s in (1e-3, 4e-3, 12e-3, 40e-3, 100e-3)]
 SHARES += [(s, 0.7) for s in (12e-3, 40e-3, 100e-3)] + [(s, 0.15) for s in (20e-3, 60e-3, 150e-3)]
@@ -189,7 +189,7 @@ BESIDE: dict[str, Signal] = {
 
 
 class Recording(NamedTuple):
-    """What the sensors showed and the true rate, each (n_ticks, n_worlds), of the worlds that stood."""
+    """Readings of the sensors and the true rate, each (n_ticks, n_worlds), of the worlds that stood."""
 
     y1: np.ndarray
     acceleration: np.ndarray
@@ -197,7 +197,7 @@ class Recording(NamedTuple):
 
 
 class Rig(NamedTuple):
-    """What is known of the rig."""
+    """Known data of the rig."""
 
     model: ReducedModel
     noise: MeasurementNoise

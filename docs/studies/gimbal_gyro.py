@@ -42,7 +42,7 @@ TILT, RATE, GIMBAL, TURN, TORQUE, OFFSET, DRAG, PIVOT, SWAY = range(9)
 """The state: x1 as y1 shows it, x2, x3 and x3'; the torque on the rig with that of e; the acceleration's offset; the
 torque on a gimbal; the pivot's share of y1 and its rate."""
 NUDGE = 1e-6
-"""Of each part of the state, for slopes."""
+"""Steps of the parts of the state, for slopes."""
 W = 2.0 * math.pi * 5.0
 """Corner of the pivot's motion, and of the torque on a gimbal [rad/s]."""
 TORQUE_START, TORQUE_WALK = 0.2, 0.01
@@ -200,7 +200,7 @@ def _corrected(x: np.ndarray, P: np.ndarray, C: np.ndarray, e: Any, variance: fl
 def floor_all(of: GimbalGyro) -> float:
     """Return the least error of a linear filter that knows all but the noise, to which y2 is white noise [rad/s].
 
-    Of no filter that takes y2 as an interval.
+    It bounds no filter that takes y2 as an interval.
     """
     x, still, n = np.zeros(9), np.zeros(()), of.noise
     _, F = _slopes(of.moved(_nudged(x), still, still))

@@ -223,7 +223,7 @@ class Gated(Mine):
 
 
 class NormsAll(Mine):
-    """Of arrays it takes the norm over all worlds: right in shape, and wrong."""
+    """Takes the norm of arrays over all worlds: right in shape, and wrong."""
 
     def step(self, state: Any, y: Measurement, u: Any) -> Any:
         state, (x1, x2, x3) = super().step(state, y, u)

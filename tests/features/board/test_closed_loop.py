@@ -243,7 +243,7 @@ def test_a_processor_takes_one_axis() -> None:
 
 @pytest.mark.parametrize("wrong", [{"x_e": math.nan}, {"x_e": math.inf}, {"u": math.nan}])
 def test_an_answer_that_is_no_number_stops_the_run(wrong: dict[str, float]) -> None:
-    """Of a law with an integrator."""
+    """The law has an integrator."""
     experiment = short("linear")
     host = Recorder(experiment)
     update = host.update

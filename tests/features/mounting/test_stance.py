@@ -101,7 +101,7 @@ def simulated_rate(model: mujoco.MjModel, expected: float) -> float:
 @pytest.mark.parametrize("step", [0.0005, 0.002, 0.005])
 @pytest.mark.parametrize("size", slow_but([0.05, 0.1, 0.25, 1.0, 3.0], 0.05, 3.0))
 def test_a_robot_of_any_size_stands_and_falls_at_any_step(size: float, step: float) -> None:
-    """Of the masses of one material, and of 2 kg, at the rate of a closed form."""
+    """With the masses of one material, and with 2 kg, at the rate of a closed form."""
     for density in (263.0, 2.0 / size**3):
         model = put(
             robot("ball feet", size, step, density), body="frame", scale=4.0 * size, position=(0.0, 0.0, 0.7 * size)
