@@ -15,12 +15,12 @@ import numpy as np
 from cmg_mj.core.errors import InputError, counted
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.clipping import clipped_rows
 from cmg_mj.features.replay.log import (
     ACCELEROMETERS,
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
-    Column,
     Log,
     ReadOptions,
     Segment,
@@ -28,7 +28,7 @@ from cmg_mj.features.replay.log import (
     columns_of,
     read_table,
 )
-from cmg_mj.features.replay.noise import smallest_step, white_noise_of
+from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.stages.push import Window, inside, push_windows
@@ -66,12 +66,6 @@ UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
 NO_ANGLE = 2.5 * math.pi
 """A larger step leads to a number that is no angle, or back [rad]."""
-CLIPPED = 5
-"""Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
-STEEP = 32.0
-"""Fall in two rows beside them, in smallest steps by rows (up to ten): a parabola in steps falls by 16."""
-REST = 0.05
-"""A tilt that stands while its rate is below this share of its largest is at rest."""
 MAX_DELAY_S = 1e6
 """Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
@@ -120,7 +114,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
-    clipped = _clipped_rows(signals, columns, notes)
+    clipped = clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
@@ -225,37 +219,6 @@ def _times(
     if not rows.any():
         raise InputError(f"--time-range {start:g}:{end:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s")
     return counted[: rows.sum()] if time is None else time[rows], _select(signals, rows)
-
-
-def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
-    """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
-
-    A signal that comes to its end quickly, stays there for longer than elsewhere, and leaves quickly is clipped. A
-    quantised one turns in few steps.
-    """
-    clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
-    rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
-    meaning = "clipped, and the reference is not compared there" if "rate" in signals else "clipped, or at a stop"
-    for role, values in signals.items():
-        if role == "command" or role.startswith("gimbal"):
-            continue  # which stand at their ends by right
-        (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
-        usual = np.median(np.diff(np.flatnonzero(np.diff(values, prepend=math.nan, append=math.nan))))
-        steep = STEEP * smallest_step(values[np.isfinite(values)])
-        found = []
-        for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
-            n_rows, at_end = 0, values == end
-            for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
-                fall = np.fmin.reduce(np.abs(around[[start, stop + 3]] - end))
-                rests = role == "tilt" and np.median(rate[start:stop]) < REST * np.fmax.reduce(rate)
-                if stop - start > 2.0 * usual and fall * min(stop - start, 10) > steep and not rests:
-                    n_rows += stop - start
-            if n_rows >= CLIPPED:
-                clipped |= at_end
-                found.append(f"{at_end.sum():,} rows at its {word} value, {(end - offset) / factor:.6g}")
-        if found:
-            notes.append(f"{name!r} stands {', and '.join(found)}: {meaning}")
-    return clipped
 
 
 def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
