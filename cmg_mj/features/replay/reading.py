@@ -91,7 +91,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
     if not path.is_file():
-        raise InputError(f"{path}: no such file; name a CSV or Parquet file, or the folder of a run")
+        raise InputError(
+            f"{path}: no plain file; name a CSV or Parquet file, or the folder of a run. Save what a pipe sends"
+        )
     if not options.columns:
         return _read_run(path, options)
     columns = columns_of(options)
@@ -116,6 +118,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         slowest = BALANCED_HZ
     clipped = clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, notes)
+    time = _unrounded(time, measured["y1_rad"], notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
     tilt = joined["y1_rad"]
@@ -259,6 +262,25 @@ def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
     return out
 
 
+def _unrounded(time: np.ndarray, angle: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Put stamps that are rounded to most of a period on the even grid that they show, (n_rows,) [s].
+
+    Rounding makes every m-th step, more or less by one, twice as long. Lost rows do so at random, or the tilt moves
+    more across them.
+    """
+    steps, sizes = np.diff(time), np.abs(np.diff(angle))
+    unit = np.median(steps)
+    longer, usual = np.abs(steps - 2.0 * unit) < EVEN * unit, steps < 2.1 * unit
+    if longer.sum() < MIN_SAMPLES or unit > (1.0 + EVEN) * _resolution(time):
+        return time
+    every = np.quantile(np.diff(np.flatnonzero(longer)), [0.1, 0.9])
+    if np.ptp(every) > 2.0 or sizes[longer].mean() > ALIKE * sizes[~longer].mean():
+        return time
+    period = steps[usual].mean()
+    notes.append(f"steps of {1e3 * unit:.4g} and {2e3 * unit:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
+    return time - np.cumsum([0.0, *np.where(usual, steps - period, 0.0)])
+
+
 def _sample(
     path: Path, time: np.ndarray, measured: Values, options: ReadOptions, slowest: float, notes: list[str]
 ) -> tuple[float, float, list[Segment]]:
@@ -369,7 +391,11 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         )
         time, values = time[present], _select(values, present)
     if len(time) < MIN_SAMPLES:
-        raise InputError(f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
+        cure = ". Where each sensor has rows of its own, fill their empty cells, as with pandas' interpolate()"
+        raise InputError(
+            f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}"
+            f"{cure if len(missing) else ''}"
+        )
     steps = np.diff(time)
     back = steps < 0.0
     if back.any():
@@ -469,11 +495,12 @@ def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:
 
 def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndarray, delay_s: float) -> np.ndarray:
     """Interpolate the reference at the samples' times; NaN before it, after it and in its gaps."""
-    order = np.argsort(time, kind="stable")[: np.isfinite(time).sum()]  # NaN comes last
-    time, reference = time[order], reference[order]
+    known = np.isfinite(time) & np.isfinite(reference)
+    order = np.argsort(time[known], kind="stable")
+    time, reference = time[known][order], reference[known][order]
     step = float(segments[0].time[1] - segments[0].time[0])
-    known = np.concatenate([[True], np.diff(time) > SAME_TIME * step]) & np.isfinite(reference)
-    time, reference = time[known], reference[known]
+    later = np.diff(time, prepend=-math.inf) > SAME_TIME * step
+    time, reference = time[later], reference[later]
     if len(time) < MIN_SAMPLES:
         return np.full(sum(len(segment.time) for segment in segments), np.nan)
     sampled = []
