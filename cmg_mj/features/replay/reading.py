@@ -189,7 +189,7 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
 
 
 def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
-    """Read logs, and refuse one that is named twice: it would count twice in means and intervals."""
+    """Read logs, and refuse one that is named twice: `tune-log` would count it twice."""
     files = [os.path.realpath(path).removesuffix("/trajectory.parquet") for path in paths]
     for i, path in enumerate(paths):
         if files[i] in files[:i]:
