@@ -391,7 +391,7 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         )
         time, values = time[present], _select(values, present)
     if len(time) < MIN_SAMPLES:
-        cure = ". Where each sensor has rows of its own, fill their empty cells, as with pandas' interpolate()"
+        cure = ". Where each sensor has rows of its own, join them, as with pandas' groupby(TIME).first().interpolate()"
         raise InputError(
             f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}"
             f"{cure if len(missing) else ''}"

@@ -254,7 +254,7 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
         (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back.*: cut the log there"),
         (lambda c: {"t_s": c["t_s"][::-1]}, "time goes back.*: sort the rows by time$"),
         (lambda c: {"t_s": [*c["t_s"][:700], "abc", *c["t_s"][701:]]}, "column 't_s': 'abc' in row 701 is no number"),
-        (lambda c: {"tilt_rad": [None, 0.1] * (N // 2), "t_s": [0.1, None] * (N // 2)}, "0 rows .* fill their empty"),
+        (lambda c: {"tilt_rad": [None, 0.1] * (N // 2), "t_s": [0.1, None] * (N // 2)}, "0 rows .* groupby"),
         (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows .*at least 20$"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "has no row"),
     ],
