@@ -277,7 +277,7 @@ def _unrounded(time: np.ndarray, angle: np.ndarray, notes: list[str]) -> np.ndar
     if np.ptp(every) > 2.0 or sizes[longer].mean() > ALIKE * sizes[~longer].mean():
         return time
     period = steps[usual].mean()
-    notes.append(f"steps of {1e3 * unit:.4g} and {2e3 * unit:.4g} ms taken as even sampling at {1.0 / period:.6g} Hz")
+    notes.append(f"steps of {1e3 * unit:.3g} and {2e3 * unit:.3g} ms taken as even sampling at {1.0 / period:.6g} Hz")
     return time - np.cumsum([0.0, *np.where(usual, steps - period, 0.0)])
 
 
