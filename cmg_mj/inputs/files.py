@@ -144,7 +144,7 @@ def read_text(path: Path, name: str, max_bytes: int) -> str:
             raise InputError(f"{name}: larger than {max_bytes // 1_000_000} MB")
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not UTF-8 text (at byte {error.start})") from error
+        raise InputError(f"{name}: not UTF-8 text (at byte {error.start}); save it as UTF-8") from error
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {error.strerror}") from error
 

@@ -30,21 +30,20 @@ from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.resolve import describe_differences
 
 ABOUT_FIGURES = """\
-Error: RMS of the estimated tilt rate less the true one; push window: to 1 s after a push's end.
-Fit: 1 - error / RMS of the true rate; 1 is the truth, 0 an estimate of zero."""
+Error: RMS of the estimated tilt rate less the true one; push window: from a push to 1 s after it.
+Fit: 1 - error / RMS of the true rate. Settle time: from the last push's end until the tilt stays
+within metrics.settle_band_deg, by default 1 deg. Gimbal peak: largest angle from upright."""
 ABOUT_COMPARISONS = f"""\
 Means over the worlds that stood to the end (settle time: that settled), with 95 % intervals.
 {ABOUT_FIGURES}"""
-ABOUT_RUNS = """\
-Floors: lower bounds on the error, from the tilt (floor_y1), or tilt and acceleration (floor_accel).
-mems_fused: a two-dollar gyro, fused with the tilt. All figures: summary.json, or --json."""
-BESIDE = ("velocity_rms_error_fog", "velocity_rms_rad", "velocity_fit_", "command_")
-RUN_FIGURES = [key for key in KEYS if not key.startswith(BESIDE)]
-"""Figures of the observer in the loop that `cmg-mj run` prints."""
 ABOUT_BASELINES = """\
-zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same
-after a second at rest; mems_fused, as bought, in a Kalman filter with y1; floor_y1 and floor_accel,
-lower bounds on the error from the measured tilt, and from tilt and angular acceleration."""
+zero: always 0. mems_fused: a two-dollar gyro, fused with the tilt. All figures: --json.
+Floors: lower bounds on the error, from the tilt (floor_y1), or tilt and acceleration (floor_accel)."""
+BESIDE = ("velocity_rms_error_fog", "velocity_rms_rad", "velocity_fit_", "command_")
+PRINTED = [key for key in KEYS if not key.startswith(BESIDE)]
+"""Figures of an observer in the loop that `run` and `compare` print."""
+NOT_PRINTED = (MEMS_AS_BOUGHT, MEMS_GYRO)
+"""Baselines that `run` and `compare` do not print."""
 
 
 def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
@@ -58,7 +57,8 @@ def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
         The means with their 95 % intervals and, if there are any, the paired differences to the best of each column.
     """
     stopped = any(summary["stopped_fraction"] for summary in summaries)
-    keys = [key for key, about in KEYS.items() if about.compared and (stopped or key != "stopped_fraction")]
+    summaries = [summary for summary in summaries if summary["observer"] not in NOT_PRINTED]
+    keys = [key for key in PRINTED if KEYS[key].compared and (stopped or key != "stopped_fraction")]
     tables = [Table(_headings("observer", keys), summaries, title, _mean_entry)]
     differences = [summary["minus_best"] for summary in summaries]
     if any(less["interval"] for row in differences for less in row.values()):
@@ -118,14 +118,14 @@ def run_title(summary: Row) -> str:
 def summary_table(summary: Row) -> Group:
     """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
     axes = section(summary, AXES) or {"": summary}
-    printed = {name: {key: axis[key] for key in RUN_FIGURES if key in axis} for name, axis in axes.items()}
+    printed = {name: {key: axis[key] for key in PRINTED if key in axis} for name, axis in axes.items()}
     end = outcome_in_words(str(summary["outcome"]), summary["end_time_s"])
     tables, floors = [figures_table(printed, {next(iter(axes)): end}, run_title(summary))], ""
     for name, axis in axes.items():
         if figures := open_loop_figures(axis):
-            shown = {other: figures[other] for other in figures if other not in (MEMS_AS_BOUGHT, MEMS_GYRO)}
+            shown = {other: figures[other] for other in figures if other not in NOT_PRINTED}
             tables.append(estimates_table(f"Open loop, {name}" if name else "Open loop", shown))
-            floors = f"\n{ABOUT_RUNS}\n{about_floors(figures)}"
+            floors = f"\n{ABOUT_BASELINES}\n{about_floors(figures)}"
     return Group(*(table.rich() for table in tables), ABOUT_FIGURES + floors)
 
 

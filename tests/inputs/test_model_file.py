@@ -183,7 +183,7 @@ def test_a_lock_where_the_keyframe_gives_no_rates() -> None:
 
 def test_a_file_that_is_no_text() -> None:
     Path("my.xml").write_bytes(b"<mujoco>\xff</mujoco>")
-    assert cmg_mj("check", "my.xml").complaint == "my.xml: not UTF-8 text (at byte 8)"
+    assert cmg_mj("check", "my.xml").complaint == "my.xml: not UTF-8 text (at byte 8); save it as UTF-8"
 
 
 def test_all_that_is_missing_is_said_at_once() -> None:

@@ -372,14 +372,19 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
 
     try:
         with path.open("rb") as file:
-            is_parquet = file.read(4) == b"PAR1"
+            start = file.read(4)
+            if not start:
+                raise InputError(f"{path}: is empty")
             file.seek(0)
-            table = pq.read_table(file) if is_parquet else _read_csv(path, file, columns, options)
+            table = pq.read_table(file) if start == b"PAR1" else _read_csv(path, file, columns, options)
         headings = [heading.strip() for heading in table.column_names]
     except InputError:
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, TypeError) as error:
-        text = shortened(" ".join(str(error).split()))
+        said = re.sub("CSV parse error: Row #", "about line ", " ".join(str(error).split()))
+        text = shortened(
+            re.sub(r"In CSV column #(\d+): Row #(\d+)", lambda m: f"about line {m[2]}, column {int(m[1]) + 1}", said)
+        )
         raise InputError(
             f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
         ) from error
@@ -389,6 +394,8 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
     for role, (name, _, factor, offset) in list(columns.items()):
         if name.strip() not in headings:
             raise InputError(f"{path}: has no column {name!r}; {nearest(name, headings, 'it has')}")
+        if headings.count(name.strip()) > 1:
+            raise InputError(f"{path}: has {headings.count(name.strip())} columns {name!r}: rename all but one")
         numbers = table[headings.index(name.strip())]
         is_text, is_date = pa.types.is_string(numbers.type), pa.types.is_timestamp(numbers.type)
         if role == "time" and (is_text or is_date):

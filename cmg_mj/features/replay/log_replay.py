@@ -21,7 +21,7 @@ from cmg_mj.features.replay.reference import SPAN_S, Alignment, alignment_of
 from cmg_mj.features.replay.scores import rms, scores
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
-from cmg_mj.observers.parameter_options import Parameters, numbers
+from cmg_mj.observers.parameter_options import Parameters, ParameterValue, numbers
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
 from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
@@ -179,11 +179,8 @@ def _ready(
             OBSERVER_CLASSES.check_names(name, parameters.get(name, {}))
             left_out[name] = "needs " + " and ".join(NEEDS_IN_WORDS[need] for need in lacks)
             continue
-        own, start = dict(parameters.get(name, {})), OBSERVER_CLASSES.takes(name).get("rate_start")
-        if start is not None and log.scenario is None:  # a log may begin in the middle of a motion
-            own.setdefault("rate_start", max(start.default, _rate_of(log)))
         try:
-            ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **own)
+            ready[name] = observer_on(log, name, model, noise, **parameters.get(name, {}))
         except InputError as error:
             if name in parameters:
                 raise
@@ -192,6 +189,16 @@ def _ready(
         reasons = "; ".join(f"{name} {reason}" for name, reason in left_out.items())
         raise InputError(f"{log.name}: no observer can take part: {reasons}")
     return ready, left_out
+
+
+def observer_on(
+    log: Log, name: str, model: ReducedModel | None, noise: MeasurementNoise, **parameters: ParameterValue
+) -> Observer:
+    """Make an observer for a log; without a `rate_start` it takes the log's, since a log may begin in a motion."""
+    start = OBSERVER_CLASSES.takes(name).get("rate_start")
+    if start is not None and log.scenario is None:
+        parameters.setdefault("rate_start", max(start.default, _rate_of(log)))
+    return make_observer(name, log.dt, model or NO_MODEL, noise, **parameters)
 
 
 def _rate_of(log: Log) -> float:

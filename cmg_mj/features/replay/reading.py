@@ -15,12 +15,12 @@ import numpy as np
 from cmg_mj.core.errors import InputError, counted
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.clipping import clipped_rows
 from cmg_mj.features.replay.log import (
     ACCELEROMETERS,
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
-    Column,
     Log,
     ReadOptions,
     Segment,
@@ -28,7 +28,7 @@ from cmg_mj.features.replay.log import (
     columns_of,
     read_table,
 )
-from cmg_mj.features.replay.noise import smallest_step, white_noise_of
+from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.stages.push import Window, inside, push_windows
@@ -66,12 +66,6 @@ UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
 NO_ANGLE = 2.5 * math.pi
 """A larger step leads to a number that is no angle, or back [rad]."""
-CLIPPED = 5
-"""Fewest rows at an end of a signal's range for which its sensor counts as clipped."""
-STEEP = 32.0
-"""Fall in two rows beside them, in smallest steps by rows (up to ten): a parabola in steps falls by 16."""
-REST = 0.05
-"""A tilt that stands while its rate is below this share of its largest is at rest."""
 MAX_DELAY_S = 1e6
 """Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
@@ -97,7 +91,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if path.is_dir() and (path / "trajectory.parquet").is_file():
         path = path / "trajectory.parquet"
     if not path.is_file():
-        raise InputError(f"{path}: no such file; name a CSV or Parquet file, or the folder of a run")
+        raise InputError(
+            f"{path}: no plain file; name a CSV or Parquet file, or the folder of a run. Save what a pipe sends"
+        )
     if not options.columns:
         return _read_run(path, options)
     columns = columns_of(options)
@@ -120,8 +116,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
-    clipped = _clipped_rows(signals, columns, notes)
+    clipped = clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, notes)
+    time = _unrounded(time, measured["y1_rad"], notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
     tilt = joined["y1_rad"]
@@ -192,7 +189,7 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
 
 
 def read_logs(paths: Sequence[str], options: ReadOptions) -> list[Log]:
-    """Read logs, and refuse one that is named twice: it would count twice in means and intervals."""
+    """Read logs, and refuse one that is named twice: `tune-log` would count it twice."""
     files = [os.path.realpath(path).removesuffix("/trajectory.parquet") for path in paths]
     for i, path in enumerate(paths):
         if files[i] in files[:i]:
@@ -225,37 +222,6 @@ def _times(
     if not rows.any():
         raise InputError(f"--time-range {start:g}:{end:g}: {path} has no row there; it lasts {np.nanmax(clock):.6g} s")
     return counted[: rows.sum()] if time is None else time[rows], _select(signals, rows)
-
-
-def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[str]) -> np.ndarray:
-    """Find the rows in which a sensor stands at an end of its range, and note them, (n_rows,).
-
-    A signal that comes to its end quickly, stays there for longer than elsewhere, and leaves quickly is clipped. A
-    quantised one turns in few steps.
-    """
-    clipped = np.zeros(len(next(iter(signals.values()))), dtype=bool)
-    rate = np.abs(signals.get("rate", np.where(clipped, 0.0, np.nan)))
-    meaning = "clipped, and the reference is not compared there" if "rate" in signals else "clipped, or at a stop"
-    for role, values in signals.items():
-        if role == "command" or role.startswith("gimbal"):
-            continue  # which stand at their ends by right
-        (name, _, factor, offset), around = columns[role], np.pad(values, 2, constant_values=math.nan)
-        usual = np.median(np.diff(np.flatnonzero(np.diff(values, prepend=math.nan, append=math.nan))))
-        steep = STEEP * smallest_step(values[np.isfinite(values)])
-        found = []
-        for end, word in ((np.fmax.reduce(values), "largest"), (np.fmin.reduce(values), "smallest")):
-            n_rows, at_end = 0, values == end
-            for start, stop in np.flatnonzero(np.diff(at_end, prepend=False, append=False)).reshape(-1, 2):
-                fall = np.fmin.reduce(np.abs(around[[start, stop + 3]] - end))
-                rests = role == "tilt" and np.median(rate[start:stop]) < REST * np.fmax.reduce(rate)
-                if stop - start > 2.0 * usual and fall * min(stop - start, 10) > steep and not rests:
-                    n_rows += stop - start
-            if n_rows >= CLIPPED:
-                clipped |= at_end
-                found.append(f"{at_end.sum():,} rows at its {word} value, {(end - offset) / factor:.6g}")
-        if found:
-            notes.append(f"{name!r} stands {', and '.join(found)}: {meaning}")
-    return clipped
 
 
 def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
@@ -294,6 +260,25 @@ def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
         notes.append(f"the tilt jumps by a turn {counted(jumps, 'time')}: made to run on")
         out[known] = np.unwrap(out[known])
     return out
+
+
+def _unrounded(time: np.ndarray, angle: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Put stamps that are rounded to most of a period on the even grid that they show, (n_rows,) [s].
+
+    Rounding makes every m-th step, more or less by one, twice as long. Lost rows do so at random, or the tilt moves
+    more across them.
+    """
+    steps, sizes = np.diff(time), np.abs(np.diff(angle))
+    unit = np.median(steps)
+    longer, usual = np.abs(steps - 2.0 * unit) < EVEN * unit, steps < 2.1 * unit
+    if longer.sum() < MIN_SAMPLES or unit > (1.0 + EVEN) * _resolution(time):
+        return time
+    every = np.quantile(np.diff(np.flatnonzero(longer)), [0.1, 0.9])
+    if np.ptp(every) > 2.0 or sizes[longer].mean() > ALIKE * sizes[~longer].mean():
+        return time
+    period = steps[usual].mean()
+    notes.append(f"steps of {1e3 * unit:.3g} and {2e3 * unit:.3g} ms taken as even sampling at {1.0 / period:.6g} Hz")
+    return time - np.cumsum([0.0, *np.where(usual, steps - period, 0.0)])
 
 
 def _sample(
@@ -406,7 +391,11 @@ def _complete(path: Path, time: np.ndarray, values: Values, notes: list[str]) ->
         )
         time, values = time[present], _select(values, present)
     if len(time) < MIN_SAMPLES:
-        raise InputError(f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}")
+        cure = ". Where each sensor has rows of its own, join them, as with pandas' groupby(TIME).first().interpolate()"
+        raise InputError(
+            f"{path}: {counted(len(time), 'row')} with all that is needed; at least {MIN_SAMPLES}"
+            f"{cure if len(missing) else ''}"
+        )
     steps = np.diff(time)
     back = steps < 0.0
     if back.any():
@@ -506,11 +495,12 @@ def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:
 
 def _reference(segments: Sequence[Segment], time: np.ndarray, reference: np.ndarray, delay_s: float) -> np.ndarray:
     """Interpolate the reference at the samples' times; NaN before it, after it and in its gaps."""
-    order = np.argsort(time, kind="stable")[: np.isfinite(time).sum()]  # NaN comes last
-    time, reference = time[order], reference[order]
+    known = np.isfinite(time) & np.isfinite(reference)
+    order = np.argsort(time[known], kind="stable")
+    time, reference = time[known][order], reference[known][order]
     step = float(segments[0].time[1] - segments[0].time[0])
-    known = np.concatenate([[True], np.diff(time) > SAME_TIME * step]) & np.isfinite(reference)
-    time, reference = time[known], reference[known]
+    later = np.diff(time, prepend=-math.inf) > SAME_TIME * step
+    time, reference = time[later], reference[later]
     if len(time) < MIN_SAMPLES:
         return np.full(sum(len(segment.time) for segment in segments), np.nan)
     sampled = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from rich.console import Group
 from rich.text import Text
@@ -12,18 +12,16 @@ from cmg_mj.features.replay.log_replay import ReplayResult
 from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import remarks_on
 from cmg_mj.features.replay.scores import RECONSTRUCTED_S
-from cmg_mj.results.baselines import ZERO
-from cmg_mj.results.intervals import Interval, finite_mean, finite_values, format_interval, known_ends
 from cmg_mj.results.summary_keys import Key, SummaryValue
-from cmg_mj.results.tables import Row, Table
+from cmg_mj.results.tables import Table
 from cmg_mj.view.plots.style import observers_to_draw
 
 FIGURES = {
     "velocity_rms_error_rad_s": Key("RMS error", "rad/s", "{:.4f}"),
-    "velocity_fit": Key("fit", "", "{:.3f}", better="more", positive=False),
+    "velocity_fit": Key("fit", "", "{:.3f}", better="more"),
     "velocity_rms_error_push_rad_s": Key("error in windows", "rad/s", "{:.4f}"),
-    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more", positive=False),
-    "lag_s": Key("lag", "ms", "{:.2f}", positive=False),
+    "velocity_fit_push": Key("fit in windows", "", "{:.3f}", better="more"),
+    "lag_s": Key("lag", "ms", "{:.2f}"),
     "reconstruction_rms_deg": Key("reconstruction error", "deg", "{:.4f}"),
     "roughness_rad_s": Key("roughness", "rad/s", "{:.4f}"),
     "noise_gain_1_s": Key("noise gain", "1/s", "{:.1f}"),
@@ -38,10 +36,7 @@ def shown_first(replayed: ReplayResult) -> list[str]:
 
 def replay_figures(replays: Sequence[ReplayResult]) -> dict[str, SummaryValue]:
     """Return the figures that `cmg-mj replay --json` prints."""
-    figures: dict[str, SummaryValue] = {"logs": [log_figures(replayed) for replayed in replays]}
-    if len(replays) > 1:
-        figures["mean"] = _means(replays)
-    return figures
+    return {"logs": [log_figures(replayed) for replayed in replays]}
 
 
 def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
@@ -68,58 +63,30 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     return {**figures, "observers": dict(replayed.summaries), "left_out": dict(replayed.left_out)}
 
 
-def _means(replays: Sequence[ReplayResult]) -> dict[str, dict[str, SummaryValue]]:
-    """Return every row's number of logs, and its figures' means over the logs that have them, the baseline's last."""
-    names = dict.fromkeys(name for replayed in replays for name in replayed.summaries)
-    means = {}
-    for name in sorted(names, key=lambda name: name == ZERO):
-        summaries = [replayed.summaries[name] for replayed in replays if name in replayed.summaries]
-        means[name] = {"logs": len(summaries)}
-        for key in _keys(replays):
-            values = finite_values([summary.get(key) for summary in summaries])
-            interval = known_ends(values, FIGURES[key].positive)
-            means[name][key] = {"mean": finite_mean(values), "interval": interval, "logs": len(values)}
-    return means
-
-
 def _keys(replays: Sequence[ReplayResult]) -> list[str]:
     return [key for key in FIGURES if any(key in f for r in replays for f in r.summaries.values())]
 
 
 def _tables(replays: Sequence[ReplayResult]) -> list[tuple[Table, list[str]]]:
-    """Tabulate each log, with its remarks, and of several the means."""
-    tables = [(_table(replayed.log.title, replayed.summaries, [replayed]), remarks(replayed)) for replayed in replays]
-    if len(replays) > 1:
-        tables.append((_table(f"Means over {len(replays)} logs, with 95 % intervals", _means(replays), replays), []))
-    return tables
+    """Tabulate each log, with its remarks."""
+    return [(_table(replayed), remarks(replayed)) for replayed in replays]
 
 
-def _table(title: str, figures: Mapping[str, Row], replays: Sequence[ReplayResult]) -> Table:
-    headings = {key: FIGURES[key].heading for key in _keys(replays)}
-    rows = [{"observer": name, **row} for name, row in figures.items()]
-    return Table({"observer": "observer", **headings}, rows, title, _entry)
-
-
-def _entry(row: Row, key: str) -> str:
-    match row.get(key):
-        case {"mean": float() as mean, "interval": [float() as low, float() as high]}:
-            interval = Interval(*(_in_unit(key, value) for value in (mean, low, high)))
-            return "\n".join([figure_text(key, mean), *format_interval(FIGURES[key].pattern, interval)])
-        case {"mean": value} | value:
-            return figure_text(key, value)
+def _table(replayed: ReplayResult) -> Table:
+    headings = {key: FIGURES[key].heading for key in _keys([replayed])}
+    rows = [{"observer": name, **row} for name, row in replayed.summaries.items()]
+    return Table(
+        {"observer": "observer", **headings}, rows, replayed.log.title, lambda row, key: figure_text(key, row.get(key))
+    )
 
 
 def figure_text(key: str, value: SummaryValue) -> str:
     """Format a figure for a table; a dash for None."""
-    return FIGURES[key].pattern.format(_in_unit(key, value)) if isinstance(value, float) else "-"
-
-
-def _in_unit(key: str, value: float) -> float:
-    return 1e3 * value if key == "lag_s" else value
+    return FIGURES[key].pattern.format(1e3 * value if key == "lag_s" else value) if isinstance(value, float) else "-"
 
 
 def replay_tables(replays: Sequence[ReplayResult]) -> Group:
-    """Return the tables that `cmg-mj replay` prints: one for each log, and one of the means."""
+    """Return the tables that `cmg-mj replay` prints: one for each log."""
     parts = []
     for table, lines in _tables(replays):
         parts += [table.rich(), *(Text(line, overflow="fold") for line in lines), *([Text("")] if lines else [])]

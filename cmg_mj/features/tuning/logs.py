@@ -16,13 +16,13 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.features.replay.log import REFERENCE, Log
-from cmg_mj.features.replay.log_replay import NO_MODEL, observer_inputs, replay_log
+from cmg_mj.features.replay.log_replay import observer_inputs, observer_on, replay_log
 from cmg_mj.features.replay.noise import noise_figures
 from cmg_mj.features.replay.reference import Alignment, alignment_of, remarks_on
 from cmg_mj.features.tuning.fit import RELEVANT, NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study, judged
 from cmg_mj.features.tuning.search import ParameterValues, plain
 from cmg_mj.features.tuning.simulations import plain_loop
-from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers import Observer
 from cmg_mj.observers.parameter_options import ParameterValue
 from cmg_mj.results.intervals import CONFIDENCE, Interval, PairedVerdict, ratio_interval
 from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
@@ -344,10 +344,14 @@ def tune_on_logs(
         for half in halves[-1]:  # an observer that cannot take part is refused, with the reason
             replay_log(half, [kind], **own._asdict(), settle_s=settle_s)
     fitted, held_out = (LogSegments(segments, settle_s) for segments in zip(*halves, strict=True))
-    makers = [partial(make_observer, kind, first.dt, own.model or NO_MODEL, own.noise) for own in inputs]
+    makers = [partial(observer_on, log, kind, own.model, own.noise) for log, own in zip(logs, inputs, strict=True)]
+
+    def chosen(parameters: ParameterValues) -> dict[str, ParameterValue]:
+        """Return the given and the tuned parameters: the others are each log's own, and those of a loop."""
+        return {**given, **{number.parameter: parameters[number.parameter] for number in fit.numbers}}
 
     def one_per_log(**candidate: ParameterValue) -> list[Observer]:
-        return [make(**candidate) for make in makers]
+        return [make(**chosen(candidate)) for make in makers]
 
     fit = ParameterFit(kind, makers[0], given, parameters, ranges)
     level = fit.level(one_per_log, fitted, held_out, on_share)
@@ -357,5 +361,5 @@ def tune_on_logs(
         split=split,
         level=level,
         stretch_s=min(len(rows) * logs[i].dt for i, rows in held_out.stretches),
-        loop=closed_loop and compare_in_loop(closed_loop, kind, fit.start_parameters, level.parameters),
+        loop=closed_loop and compare_in_loop(closed_loop, kind, given, chosen(level.parameters)),
     )

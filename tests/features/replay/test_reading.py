@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -149,12 +150,21 @@ def test_a_number_that_stands_for_none_is_no_turn(rows: int | slice, tmp_path: P
     assert_sine(log, 3e-4)
 
 
-def test_stamps_rounded_to_milliseconds_are_even(tmp_path: Path) -> None:
-    t = np.arange(3000) * 0.0025
+@pytest.mark.parametrize("rate_hz", [400.0, 800.0, 900.0, 980.0])
+def test_stamps_rounded_to_milliseconds_are_even(rate_hz: float, tmp_path: Path) -> None:
+    t = np.arange(3000) / rate_hz
     log = read(tmp_path, {**sine(t), "t_s": np.round(t, 3)})
-    assert log.dt == pytest.approx(0.0025, rel=1e-4)
+    assert 1.0 / log.dt == pytest.approx(rate_hz, rel=3e-4)
     np.testing.assert_array_equal(log["y1_rad"], tilt(t))
+    assert np.isfinite(log["reference_rad_s"]).all()
     assert "taken as even sampling" in log.notes[0]
+
+
+def test_every_tenth_row_lost_is_no_rounding(tmp_path: Path) -> None:
+    t = 1e-3 * np.arange(N)
+    log = read(tmp_path, {name: values[np.arange(N) % 10 > 0] for name, values in sine(t).items()})
+    assert log.dt == pytest.approx(1e-3)
+    assert "gaps bridged" in log.notes[0]
 
 
 @pytest.mark.parametrize(("jitter", "rate_hz"), [(0.2, None), (0.0, 130.0)])
@@ -195,9 +205,10 @@ def test_missing_numbers_are_gaps(tmp_path: Path) -> None:
     assert np.isnan(log["reference_rad_s"]).sum() == 1
 
 
-def test_a_reference_at_times_of_its_own(tmp_path: Path) -> None:
-    """Tilt and gyro in rows of their own, as a merged log has them."""
-    t = np.arange(2 * N) * DT / 2.0
+@pytest.mark.parametrize("together", [1, 2])
+def test_a_reference_in_rows_of_its_own(together: int, tmp_path: Path) -> None:
+    """Tilt and gyro in turn, as a merged log has them; at times of their own, or at the same."""
+    t = np.arange(2 * N) // together * together * DT / 2.0
     tilts, rates = list(tilt(t)), list(rate(t))
     tilts[1::2] = rates[::2] = [None] * N
     log = read(tmp_path, {"t_s": t, "tilt_rad": tilts, "gyro_rad_s": rates})
@@ -231,7 +242,9 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (lambda c: {"tilt_rad": ["x", *[0.1] * (N - 1)]}, "invalid value"),
+        (lambda c: {"tilt_rad": [0.1, "x", *[0.1] * (N - 2)]}, "about line 3, column 2: .*invalid value"),
+        (lambda c: {"tilt_rad": ["1,2", *[0.1] * (N - 1)]}, "about line 2: Expected 3 columns, got 4"),
+        (lambda c: {"note": c["t_s"], "note ": c["t_s"], "tilt_rad ": c["t_s"]}, "has 2 columns 'tilt_rad'"),
         (lambda c: {"tilt_rad": np.full(N, 0.3)}, "nothing moves"),
         (lambda c: {"gyro_rad_s": np.full(N, 0.3)}, "the reference is 0.3 rad/s in every row"),
         (lambda c: {"gyro_rad_s": [None] * N}, "the reference has no number"),
@@ -241,7 +254,8 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
         (lambda c: {"t_s": np.roll(c["t_s"], 500)}, "time goes back.*: cut the log there"),
         (lambda c: {"t_s": c["t_s"][::-1]}, "time goes back.*: sort the rows by time$"),
         (lambda c: {"t_s": [*c["t_s"][:700], "abc", *c["t_s"][701:]]}, "column 't_s': 'abc' in row 701 is no number"),
-        (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows"),
+        (lambda c: {"tilt_rad": [None, 0.1] * (N // 2), "t_s": [0.1, None] * (N // 2)}, "0 rows .* groupby"),
+        (lambda c: {k: v[:7] for k, v in c.items()}, "7 rows .*at least 20$"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "has no row"),
     ],
 )
@@ -285,12 +299,16 @@ def test_arguments_that_cannot_be(columns: dict, options: dict, message: str, tm
         read(tmp_path, sine(), columns, **options)
 
 
-@pytest.mark.parametrize("content", [b"", b"\n \n", b"\x7fELF\0\0\0", b"PAR1 and no more"])
-def test_files_that_are_none(content: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "x.csv"
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "is empty$"), (b"\n \n", ""), (b"\x7fELF\0\0\0", ""), (b"PAR1 and no more", "cannot be read")],
+)
+def test_files_that_are_none(content: bytes, message: str, tmp_path: Path) -> None:
+    path, pipe = tmp_path / "x.csv", tmp_path / "pipe"
     path.write_bytes(content)
-    for file in (path, tmp_path, tmp_path / "not.csv"):
-        with pytest.raises(InputError, match=str(file)):
+    os.mkfifo(pipe)
+    for file, words in ((path, message), (tmp_path, ""), (tmp_path / "not.csv", ""), (pipe, "no plain file.*a pipe")):
+        with pytest.raises(InputError, match=f"{file}: .*{words}"):
             read_log(file, ReadOptions(COLUMNS))
 
 

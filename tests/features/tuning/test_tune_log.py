@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from cmg_mj import InputError, load_scenario, prepare
-from cmg_mj.features.replay.log_replay import replay_prepared
+from cmg_mj.features.replay.log import REFERENCE
+from cmg_mj.features.replay.log_replay import replay_log, replay_prepared
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import tune_on_logs
 from tests.command import cmg_mj
-from tests.features.replay.motion import COLUMNS, sine, write_csv
+from tests.features.replay.motion import AMPLITUDE, COLUMNS, rate, sine, two_accelerometers, write_csv
 
 PLAIN = ",".join(f"{role}={name}" for role, name in COLUMNS.items())
 SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", "observer.k1=23.0", "seed=5"]
@@ -78,6 +79,20 @@ def test_a_runs_recording_is_tuned_as_it_replays(run: Path) -> None:
     error = half["reference_rad_s"] - replay_prepared(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"]
     stretches = np.array_split(error[half.scored(0.3)], len(study.level.given_rms))
     np.testing.assert_allclose(study.level.given_rms, [np.sqrt(np.mean(s**2)) for s in stretches], rtol=1e-9)
+
+
+def test_a_log_is_tuned_as_it_replays(tmp_path: Path) -> None:
+    """Each log's own rate is assumed at the start."""
+    logs, expected = [], []
+    for swing in (0.02, 0.35):
+        log = two_accelerometers(tmp_path, swing, noise=0.04)
+        true = swing / AMPLITUDE * rate(log["time_s"])
+        logs.append(dataclasses.replace(log, columns={**log.columns, REFERENCE: true}, has=log.has | {"reference"}))
+        half = logs[-1].cut(slice(len(log) // 2, None))
+        error = (half[REFERENCE] - replay_log(half, ["gyro_free"]).estimates["gyro_free"]["x2_rad_s"])[half.scored(1.0)]
+        expected += [np.sqrt(np.mean(stretch**2)) for stretch in np.array_split(error, 10)]
+    study = tune_on_logs(logs, "gyro_free", parameters=["jerk"])
+    np.testing.assert_allclose(study.level.given_rms, expected, rtol=2e-3)
 
 
 def test_runs_with_other_parameters_are_not_tuned_together(run: Path) -> None:
