@@ -118,6 +118,10 @@ def compare(
         result = experiment.run_many(
             worlds, keep_trajectory=False, on_progress=partial(report, i, experiment.scenario.duration_s)
         )
+        for world, outcome in enumerate(result.outcomes):
+            if outcome.with_others:  # perhaps by another world's fault
+                alone = experiment.run(world=world, keep_trajectory=False, on_progress=partial(report, i + 1, math.inf))
+                result.outcomes[world], result.summaries[world] = alone.outcomes[0], alone.summaries[0]
         if result.interrupted:
             break
         world_0 = experiment.run(on_progress=partial(report, i + 1, math.inf))
