@@ -89,6 +89,11 @@ class TakesMath(Tilts):
         return math.sin(y.y1)  # here
 
 
+class Inverts(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return (np.linalg.inv([[y.y1 + 1.0, 0.0], [0.0, 1.0]]) @ [y.y1, 0.0])[0]  # here
+
+
 class TakesModulo(Tilts):
     def tilt(self, y: Measurement) -> Any:
         return y.y1 % 1.0  # here

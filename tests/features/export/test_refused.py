@@ -25,6 +25,7 @@ DIFFERENCE = "traced, it is not what Python runs: on random signals "
         ("Branches", "a branch on a value"),
         ("TakesMath", NUMBER),
         ("FillsAnArray", NUMBER),
+        ("Inverts", "numpy's compiled routines take no symbols; write it out in + - * /"),
         ("TakesModulo", "numpy.remainder"),
         ("Raises", "step(state, y, u) raised KeyError: 'floats only'"),
         ("LooksAtTypes", f"{DIFFERENCE}x2_rad_s is off by"),
