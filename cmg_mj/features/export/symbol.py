@@ -219,8 +219,8 @@ def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX
 
 
 COMPILED = (
-    ": numpy's compiled routines take no symbols; write it out in + - * /, as the inverse of [[a, b], [c, d]]: "
-    "[[d, -b], [-c, a]] / (a*d - b*c)"
+    ": compiled routines of numpy and scipy take no symbols; write it out in + - * /, as the inverse of "
+    "[[a, b], [c, d]]: [[d, -b], [-c, a]] / (a*d - b*c)"
 )
 
 
@@ -233,13 +233,14 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
     except BaseException as error:
         walked = reversed(list(traceback.walk_tb(error.__traceback__)))
         text = raised(error)
-        cure = COMPILED if "from dtype('O')" in text else ""
+        cure = COMPILED if "from dtype('O')" in text or "object arrays" in text else ""
         raise InputError(f"{name} raised {text} {_locate(walked)}{cure}") from error
 
 
 _LIBRARY_PATHS = (
     str(Path(__file__).parent),
     str(Path(np.__file__).parent),
+    str(Path(np.__file__).parents[1] / "scipy"),
     str(Path(__file__).parents[2] / "core" / "arrays.py"),
 )
 

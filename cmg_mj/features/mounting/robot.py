@@ -145,8 +145,10 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
         option.timestep = MAX_STEP_S
     if option.timestep < SLOW_STEP_S:
-        hint = "hint: <option timestep> = %g: so many physics steps may take minutes; 0.0005 or more is quick"
-        logging.getLogger("cmg_mj").warning(hint, option.timestep)
+        logging.getLogger("cmg_mj").warning(
+            "hint: <option timestep> = %g: so many physics steps may take minutes; 0.0005 or more is quick",
+            option.timestep,
+        )
     return notes
 
 
