@@ -327,7 +327,7 @@ def load_plant(
         if not isinstance(section, entries("section")[name]):
             raise InputError(f"sections: {name}: must be a {entries('section')[name].__name__}")
     path = find("models", settings.model, ".xml", "plant.model =", beside)
-    if "model" in fields and path.resolve().parent != folder("models").resolve():
+    if "model" in fields and not path.parent.samefile(folder("models")):
         settings = replace(settings, **{"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0} | fields)
     with set_control_callback(None):  # compiling a model runs it
         return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)
@@ -355,7 +355,7 @@ def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None =
             path = find("models", settings.model, ".xml", "plant.model =")
             filed = build(path, settings, sections)
         plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
-    if not same and plant.path.resolve().parent != folder("models").resolve():
+    if not same and not plant.path.parent.samefile(folder("models")):
         _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
     return plant
 
