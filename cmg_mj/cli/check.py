@@ -96,7 +96,7 @@ def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple
         yield "", f"notch at {controller.notch_hz:g} Hz on the command"
     if isinstance(law, StateFeedback):
         loop = judge_gains(design).loop
-        yield "", f"{loop.words} with the reduced model and its true state, slowest pole {loop.slowest:.3g} 1/s,"
+        yield "", f"gains alone, on the reduced model's true state: {loop.words}, slowest pole {loop.slowest:.3g} 1/s,"
         yield "", f"least damping ratio {loop.damping:.2g}, nearest to -1 {loop.distance:.2g}"
     elif controller.kind not in LAWS:
         yield "", OWN_CODE

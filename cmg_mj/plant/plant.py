@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -305,7 +306,7 @@ def load_plant(
         axis_settings: The settings of axes that have their own: equilibrium bias, initial tilt, places of the
             accelerometers.
         sections: Settings of the features that edit the model, such as {"bend": Bend(frequency_hz=20.0)}.
-        **fields: Fields of `PlantSettings`.
+        **fields: Fields of `PlantSettings`. A robot that is not bundled begins upright, without an equilibrium bias.
 
     Returns:
         The compiled plant.
@@ -326,6 +327,8 @@ def load_plant(
         if not isinstance(section, entries("section")[name]):
             raise InputError(f"sections: {name}: must be a {entries('section')[name].__name__}")
     path = find("models", settings.model, ".xml", "plant.model =", beside)
+    if "model" in fields and not path.parent.samefile(folder("models")):
+        settings = replace(settings, **{"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.0} | fields)
     with set_control_callback(None):  # compiling a model runs it
         return Plant(build(path, settings, sections), settings, sections, axis_settings, grid)
 
@@ -352,7 +355,7 @@ def load_scenario_plant(scenario: Scenario, grid: TimeGrid, like: Plant | None =
             path = find("models", settings.model, ".xml", "plant.model =")
             filed = build(path, settings, sections)
         plant = Plant(filed, settings, sections, {name: axis.plant for name, axis in axes.items()}, grid)
-    if not same and plant.path.resolve().parent != folder("models").resolve():
+    if not same and not plant.path.parent.samefile(folder("models")):
         _ = plant.drawn_model  # a mesh that cannot be read is found before a run and not after it
     return plant
 

@@ -118,9 +118,14 @@ def compare(
         result = experiment.run_many(
             worlds, keep_trajectory=False, on_progress=partial(report, i, experiment.scenario.duration_s)
         )
+        done = partial(report, i + 1, math.inf)
+        for world, outcome in enumerate(result.outcomes):
+            if outcome.with_others:  # perhaps by another world's fault
+                alone = experiment.run(world=world, keep_trajectory=False, on_progress=done)
+                result.outcomes[world], result.summaries[world] = alone.outcomes[0], alone.summaries[0]
         if result.interrupted:
             break
-        world_0 = experiment.run(on_progress=partial(report, i + 1, math.inf))
+        world_0 = experiment.run(on_progress=done)
         if world_0.interrupted:
             break
         compared.append(ComparedObserver(experiment, result, world_0))

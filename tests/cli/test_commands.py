@@ -148,7 +148,7 @@ def test_check_says_what_a_scenario_amounts_to(quick: str) -> None:
         "scissored_pair.xml, modules: cube1, cube2",
         "equilibrium bias 0.5 deg, initial tilt 1 deg",
         "K_e = [35, 4, -1, 0.3] at 200 Hz, at most 4.7 rad/s",
-        "stable with the reduced model and its true state, slowest pole -0.203 1/s",
+        "gains alone, on the reduced model's true state: stable, slowest pole -0.203 1/s",
         "homogeneous  k1=20  k2=150  alpha=0.85",
         "open loop   none",
         "accelerometer 200 Hz, encoder 200 Hz, fog 200 Hz",

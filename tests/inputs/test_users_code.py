@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass
 from cmg_mj import Estimate, Experiment, FeedbackState, InputError, Measurement
 from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.inputs.types import STRICT, Positive
+from cmg_mj.runs.comparison import compare
 from cmg_mj.runs.open_loop import replay
 from cmg_mj.runs.side_by_side import run_jobs, run_of
 from tests.command import cmg_mj
@@ -291,6 +292,20 @@ def test_a_class_that_says_so_is_stepped_with_arrays() -> None:
         assert for_worlds(part) is not part
         part.elementwise = True  # type: ignore[union-attr]
         assert for_worlds(part) is part
+
+
+class FailsWhereItIsFar(Mine):
+    def estimate(self, k: int, y: Measurement, rate: Any) -> Any:
+        return (y.y1, rate, y.y2) if y.y1 < math.radians(3.0) else 1 / 0
+
+
+def test_a_world_in_which_a_part_fails_takes_no_other_out_of_a_comparison() -> None:
+    experiment = with_part(FailsWhereItIsFar, "sensors.accelerometer.noise_density_ug_rthz=1000")
+    alone = [experiment.run(world=world) for world in range(8)]
+    assert 0 < sum(result.stood[0] for result in alone) < 8
+    result = compare([experiment], 8)[0].result
+    assert result.outcomes == [one.outcomes[0] for one in alone]
+    assert result.summaries == [one.summaries[0] for one in alone]
 
 
 def test_no_law_gets_beyond_the_limit() -> None:

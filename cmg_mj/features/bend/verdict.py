@@ -120,7 +120,7 @@ def describe_bend(design: Design, plant: Plant) -> Judgement:
     if verdict is None:
         return Judgement([*rows, ("", "its loop is not computed for code of your own")])
     feedback = design.scenario.controller.feedback
-    rows.append(("", f"the loop with it, feedback from the {feedback}: {verdict.words}"))
+    rows.append(("", f"the whole loop with it, feedback from the {feedback}: {verdict.words}"))
     if not verdict.is_stable_rigid:
         hint = "controller, observer: the loop is not stable with a rigid frame either; `cmg-mj check` says more"
         return Judgement(rows, [hint])

@@ -209,6 +209,10 @@ def check_c(folder: Path, name: str, compiler: Sequence[str]) -> dict[str, float
     process = run([str(program)], "the compiled example")
     program.unlink()
     if process.returncode:
-        raise InputError(f"the C is not what Python runs: {'; '.join(process.stdout.splitlines())}")
+        raise InputError(
+            f"the C is not what Python runs: {'; '.join(process.stdout.splitlines())}. "
+            "In single precision: do numbers cancel, as in a covariance that begins at 1 beside a variance of 1e-5? "
+            "Begin smaller, or take --precision double"
+        )
     differences = re.findall(r"^(\w+): off by at most (\S+),", process.stdout, re.MULTILINE)
     return {part: float(off) for part, off in differences}

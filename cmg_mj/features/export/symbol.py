@@ -218,6 +218,12 @@ def function_of(name: str, inputs: Sequence[Symbol], outputs: Sequence[casadi.SX
     return function
 
 
+COMPILED = (
+    ": compiled routines of numpy and scipy take no symbols; write it out in + - * /, as the inverse of "
+    "[[a, b], [c, d]]: [[d, -b], [-c, a]] / (a*d - b*c)"
+)
+
+
 def call_traced(name: str, function: Callable[[], Result]) -> Result:
     """Call a user's code with symbols."""
     try:
@@ -226,12 +232,15 @@ def call_traced(name: str, function: Callable[[], Result]) -> Result:
         raise
     except BaseException as error:
         walked = reversed(list(traceback.walk_tb(error.__traceback__)))
-        raise InputError(f"{name} raised {raised(error)} {_locate(walked)}") from error
+        text = raised(error)
+        cure = COMPILED if "from dtype('O')" in text or "object arrays" in text else ""
+        raise InputError(f"{name} raised {text} {_locate(walked)}{cure}") from error
 
 
 _LIBRARY_PATHS = (
     str(Path(__file__).parent),
     str(Path(np.__file__).parent),
+    str(Path(np.__file__).parents[1] / "scipy"),
     str(Path(__file__).parents[2] / "core" / "arrays.py"),
 )
 

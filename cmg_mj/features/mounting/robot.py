@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,6 +31,8 @@ MAX_ASLANT = 1e-3
 """Gravity farther from straight down is no inaccuracy of the file [rad]."""
 MAX_STEP_S = 0.005
 """Largest physics step; the gimbals' servos need it [s]."""
+SLOW_STEP_S = 1e-4
+"""With smaller physics steps the trials of the robot's stance and fall take half a minute and longer [s]."""
 ITERATIONS, TOLERANCE = 100, 1e-8
 """MuJoCo's defaults for the solver; with less, held joints creep."""
 
@@ -141,6 +144,11 @@ def set_physics_options(spec: mujoco.MjSpec) -> list[str]:
     if option.timestep > MAX_STEP_S:
         notes.append(f"its physics steps of {option.timestep * 1e3:g} ms are now {MAX_STEP_S * 1e3:g} ms")
         option.timestep = MAX_STEP_S
+    if option.timestep < SLOW_STEP_S:
+        logging.getLogger("cmg_mj").warning(
+            "hint: <option timestep> = %g: so many physics steps may take minutes; 0.0005 or more is quick",
+            option.timestep,
+        )
     return notes
 
 

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import os
+import re
 import shutil
 import time
 import tomllib
@@ -357,7 +358,7 @@ def _may_take(folder: Path, fields: StudyFields, overwrite: bool) -> bool:
 
 
 def hash_of(study: SweepStudy, fields: StudyFields) -> str:
-    """Hash everything that a chunk's figures depend on, the files of a user's observers and law among it.
+    """Hash everything that a chunk's figures depend on, the files of a user's classes among it.
 
     Args:
         study: The sweep.
@@ -366,13 +367,13 @@ def hash_of(study: SweepStudy, fields: StudyFields) -> str:
     Raises:
         InputError: A file cannot be read.
     """
-    digest = hashlib.sha256(json.dumps(fields, sort_keys=True).encode())
+    text = json.dumps(fields, sort_keys=True)
+    digest = hashlib.sha256(text.encode())
     models = [str(value) for axis in study.axes if "plant.model" in axis.fields for value in axis.values]
     tracks = [file for parts in study.scenario.feature_sections.values() for part in parts for file in part.files]
     tracks += [file for axis in study.axes for file in varied_tracks(axis)]
     files = [find("models", model, ".xml", "plant.model =") for model in models or [study.scenario.plant.model]]
-    kinds = (str(kind).partition(":") for kind in (*study.observers, study.scenario.controller.kind))
-    own = (find_spec(module) for module, colon, _ in kinds if colon)
+    own = map(find_spec, re.findall(r'"([\w.]+):\w+"', text))
     tracks += [spec.origin for spec in own if spec and spec.origin]
     for path in [*itertools.chain.from_iterable(map(model_files, files)), *map(Path, tracks)]:
         try:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import solve
 
 from cmg_mj.core.arrays import clip, exp, sign, signed_power, sin, sqrt, where
 from cmg_mj.observers import Measurement
@@ -87,6 +88,16 @@ class Branches(Tilts):
 class TakesMath(Tilts):
     def tilt(self, y: Measurement) -> Any:
         return math.sin(y.y1)  # here
+
+
+class Inverts(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return (np.linalg.inv([[y.y1 + 1.0, 0.0], [0.0, 1.0]]) @ [y.y1, 0.0])[0]  # here
+
+
+class Solves(Tilts):
+    def tilt(self, y: Measurement) -> Any:
+        return solve([[y.y1 + 1.0]], [y.y1])[0]  # here
 
 
 class TakesModulo(Tilts):

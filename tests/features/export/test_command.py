@@ -138,7 +138,9 @@ def test_c_that_is_not_what_python_runs_is_not_left(monkeypatch: pytest.MonkeyPa
 
     genuine = c_code.literal
     monkeypatch.setattr(c_code, "literal", lambda value, precision: genuine(1.0001 * value, precision))
-    with pytest.raises(InputError, match=r"the C is not what Python runs: .*x2_rad_s: off by at most"):
+    with pytest.raises(
+        InputError, match=r"the C is not what Python runs: .*x2_rad_s: off by at most .* --precision double"
+    ):
         export(controller("linear"), tmp_path / "board")
     assert not (tmp_path / "board").exists()
 

@@ -16,6 +16,7 @@ from tests.features.export import own, own_laws
 from tests.features.export.compiled import controller
 
 NUMBER = "a plain number is asked for"
+CURE = "compiled routines of numpy and scipy take no symbols; write it out in + - * /"
 DIFFERENCE = "traced, it is not what Python runs: on random signals "
 
 
@@ -25,6 +26,8 @@ DIFFERENCE = "traced, it is not what Python runs: on random signals "
         ("Branches", "a branch on a value"),
         ("TakesMath", NUMBER),
         ("FillsAnArray", NUMBER),
+        ("Inverts", CURE),
+        ("Solves", CURE),
         ("TakesModulo", "numpy.remainder"),
         ("Raises", "step(state, y, u) raised KeyError: 'floats only'"),
         ("LooksAtTypes", f"{DIFFERENCE}x2_rad_s is off by"),

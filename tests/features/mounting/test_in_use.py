@@ -78,7 +78,10 @@ def test_it_stands_in_ones_own_loop_with_gains_of_its_own_and_the_papers_are_hin
 ) -> None:
     """Whole physics steps fill the 5 ms between two decisions, whatever the model file's step is."""
     spec = mujoco.MjSpec.from_string(STICK.format(step=step))
-    plant = cmg_mj.load_plant(model=str(mount(spec, "stick", axis="lean").save("balanced.xml")), initial_tilt_deg=0.5)
+    path = str(mount(spec, "stick", axis="lean").save("balanced.xml"))
+    assert cmg_mj.load_plant(model=path, initial_tilt_deg=0.5).settings.initial_tilt_deg == 0.5
+    plant = cmg_mj.load_plant(model=path)
+    assert plant.settings.initial_tilt_deg == plant.settings.equilibrium_bias_deg == 0.0
     assert plant.timestep <= step
     law = StateFeedback(dt=0.005, gains=scaled_gains(plant.reduced))
     cmg_mj.controller(cmg_mj.load_plant())

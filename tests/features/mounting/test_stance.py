@@ -14,6 +14,7 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.mounting import mount
 from cmg_mj.features.mounting.report import _advice
+from cmg_mj.features.mounting.robot import set_physics_options
 from cmg_mj.plant.axis import find_axis
 from cmg_mj.plant.elements import axis_modules
 from cmg_mj.plant.plant import load_plant
@@ -343,7 +344,12 @@ def test_flags_of_a_file_by_hand_are_off_in_every_run() -> None:
     assert not load_plant(model="asleep.xml").model.opt.enableflags
 
 
-def test_small_steps_are_named_where_the_search_does_not_end() -> None:
+def test_small_steps_are_named_before_the_trials_and_where_the_search_does_not_end(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    for step in ("0.002", "0.000025"):
+        set_physics_options(mujoco.MjSpec.from_string(trunk().replace("0.002", step)))
+    assert [message[:34] for message in caplog.messages] == ["hint: <option timestep> = 2.5e-05:"]
     small, usual = (_advice(SimpleNamespace(plant=SimpleNamespace(timestep=step))) for step in (25e-6, 1e-3))  # type: ignore[arg-type]
     assert "its physics steps of 0.025 ms are too many; give its file a larger <option timestep>" in small
     assert "while the machine does nothing else" in usual

@@ -106,6 +106,16 @@ def test_a_damaged_chunk_is_computed_again(whole: Store, harm: Callable[[Path], 
     assert again.left() == []
 
 
+def test_the_file_of_a_varied_law_is_in_the_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    file = tmp_path / "varied_law.py"
+    file.write_text("from cmg_mj.laws.state_feedback import StateFeedback")
+    varied = make_study({"controller.kind": ["state_feedback", "varied_law:StateFeedback"]})
+    before = hash_of(varied, resolved(varied))
+    file.write_text("from cmg_mj.laws.state_feedback import StateFeedback  # changed")
+    assert hash_of(varied, resolved(varied)) != before
+
+
 def test_other_versions_are_another_hash(whole: Store) -> None:
     fields = resolved(whole.study)
     other = {**fields, "scenario": {**fields["scenario"], "versions": {"mujoco": "2.0"}}}
