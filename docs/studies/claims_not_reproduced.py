@@ -99,7 +99,7 @@ def oscillation() -> Iterator[Reading]:
     settings: dict[str, dict[str, float]] = {f"gap of {of:g} arcmin": {gap: of} for of in (0.0, 5.0, 10.0, 20.0, 40.0)}
     settings |= {f"gap of 20 arcmin, e = {e:g} deg": {"plant.equilibrium_bias_deg": e} for e in (0.1, 0.25)}
     settings |= {
-        "gap of 20 arcmin, let go 2 deg off": {"plant.initial_tilt_deg": 2.0},
+        "gap of 20 arcmin, let go 2 deg off": {"plant.initial_tilt_deg": 2.0, "duration_s": 36.0},
         "y1 50 ms late": {gap: 0.0, late: 0.05},
     }
     nine = {"k1": figure_3.L1, "k2": figure_3.stiffness(gimbal.experiment().plant.reduced), "alpha": 1.0}
