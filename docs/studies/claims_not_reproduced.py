@@ -1,6 +1,6 @@
 """The nine claims of the papers that are not reproduced, each in all readings that its row of docs/reproduced.md names.
 
-    python docs/studies/claims_not_reproduced.py [--claim ID]
+    python docs/studies/claims_not_reproduced.py [--claim ID] (about six minutes)
 
 A table a claim: a row is a reading of what the paper leaves open, with the figures that the claim compares.
 """

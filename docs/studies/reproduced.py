@@ -19,7 +19,7 @@ WIDTH, COLOURS = 820, 40
 """Width [px] and number of palette colours of the small pictures."""
 READINGS = """
 `python docs/studies/claims_not_reproduced.py [--claim ID]` prints each of the claims that are not
-reproduced in all readings that its row names, with the figures that it compares (five minutes).
+reproduced in all readings that its row names, with the figures that it compares (six minutes).
 """
 """Paragraph that the page has before the first paper."""
 _PICTURE = re.compile(r"(\[picture\]\()([^)]+\.png)\)")

@@ -33,7 +33,7 @@ TESTED = (
     "larger Sigma is slower. One output is corrected. Once that correction is much faster than the regressor C2 T "
     "turns, the estimates slide along the directions that the output does not see, the more slowly the stiffer it is. "
     "A finer step makes 10000 slower still: this is no effect of sampling. So it is for the state's error, too. "
-    "Of seven weights 300 is the soonest into bands of 0.01 and 0.1, 100 into 1, and 10 for the state into 1."
+    "The wider the band, the smaller the best Sigma: some hundreds into 0.1, 100 into 1, and 10 for the state into 1."
 )
 
 
