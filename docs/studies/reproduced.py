@@ -17,6 +17,11 @@ DOCS = Path(__file__).resolve().parents[1]
 PICTURES = DOCS / "reproduced"
 WIDTH, COLOURS = 820, 40
 """Width [px] and number of palette colours of the small pictures."""
+READINGS = """
+`python docs/studies/claims_not_reproduced.py [--claim ID]` prints each of the claims that are not
+reproduced in all readings that its row names, with the figures that it compares (six minutes).
+"""
+"""Paragraph that the page has before the first paper."""
 _PICTURE = re.compile(r"(\[picture\]\()([^)]+\.png)\)")
 
 
@@ -37,7 +42,7 @@ def main(run: Path) -> None:
         old.unlink()
     for _, name in _PICTURE.findall(report):
         small(run / name, PICTURES / name)
-    page = _PICTURE.sub(r"\1reproduced/\2)", report)
+    page = _PICTURE.sub(r"\1reproduced/\2)", report).replace("\n## ", f"{READINGS}\n## ", 1)
     (DOCS / "reproduced.md").write_text(re.sub(r"(?<=\w)\[(\d+)\]\[(\d+)\]", r"\\[\1][\2]", page), encoding="utf-8")
 
 

@@ -21,6 +21,7 @@ REAL_RIGS = ("real_bend", "real_pivot", "real_rigs", "real_vibration")
     "line",
     [
         "baselines.py --worlds 2",
+        "claims_not_reproduced.py --claim andrieu2009-bounds",
         "for_a_builder.py --worlds 2 --observers linear,gyro_free",
         "gimbal_gyro.py --worlds 2 --parts loop",
         "free_pivot_tuning.py --worlds 2 --falls 2 --jobs 1",

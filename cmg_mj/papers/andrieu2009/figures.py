@@ -351,8 +351,8 @@ def bias_of_constant_gain(study: Study) -> Claim:
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, shares_left < HALF, strict=True)),
         otherwise="It is made by the noise, which sends the estimate from end to end of the domain, where the limits "
-        "cut off one side more than the other. Noise renewed every 1 ms, 0.1 or 1 makes it as well. Without noise all "
-        "of it is due to hbar, but Fig. 2 has noise.",
+        "cut off one side more than the other. Noise renewed every 1 ms, 0.1 or 1 makes it as well, but for t = 15 to "
+        "20 with the last two. Without noise all of it is due to hbar, but Fig. 2 has noise.",
         figures={"share_left_with_exact_hbar": shares_left},
     )
 
@@ -366,7 +366,8 @@ def bias_of_updated_gains(study: Study) -> Claim:
         assumes={**ASSUMED, "threshold": "due to it if less than half is left"},
         holds=dict(zip(WINDOW_NAMES, np.all(shares_left < HALF, axis=0), strict=True)),
         otherwise="Half of it or more remains for one of them where it fails; there the bias itself is small. So it is "
-        "with noise renewed every 1 ms. Without noise nearly all of it is due to hbar, but Fig. 2 has noise.",
+        "with noise renewed every 1 ms; every 0.1 or 1, more remains. Without noise nearly all of it is due to hbar, "
+        "but Fig. 2 has noise.",
         figures={"share_left_with_exact_hbar": dict(zip(KINDS[1:], shares_left, strict=True))},
     )
 

@@ -62,9 +62,9 @@ class Tuning(NamedTuple):
         return {name: mean_interval(rms(rates[self.window] - gyro) / rms(gyro)) for name, rates in self.rates.items()}
 
 
-def tuning_experiment(worlds: int = WORLDS, seed: int = SEED) -> Tuning:
+def tuning_experiment(worlds: int = WORLDS, seed: int = SEED, settings: Sequence[str] = ()) -> Tuning:
     """Close the loop on the gyro and replay the estimators on it."""
-    prepared = experiment([f"seed={seed}", "duration_s=5.0"], feedback="fog")
+    prepared = experiment([f"seed={seed}", "duration_s=5.0", *settings], feedback="fog")
     trajectory = trajectory_of(prepared.run_many(worlds))
     observers = {name: estimator(name, prepared) for name in OBSERVERS} | {WITH_Y2: nine_with_y2(prepared)}
     rates = {name: replay(observer, trajectory).x2 for name, observer in observers.items()}

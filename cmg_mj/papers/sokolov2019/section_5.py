@@ -215,8 +215,7 @@ def cause_of_figure_5(cycles: Cycles) -> Claim:
         figures={
             "cycle_amplitude_deg": without_y2.amplitude_deg,
             "cycle_amplitude_with_nonlinear_terms_deg": with_y2.amplitude_deg,
-            "foreseen_amplitude_deg": {name: cycle and cycle.amplitude_deg for name, cycle in cycles.predicted.items()},
-            "foreseen_frequency_hz": {name: cycle and cycle.frequency_hz for name, cycle in cycles.predicted.items()},
+            "foreseen": {name: cycle and cycle._asdict() for name, cycle in cycles.predicted.items()},
         },
     )
 
