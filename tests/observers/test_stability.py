@@ -22,4 +22,4 @@ def test_slow_poles_do_fade() -> None:
 def test_check_says_so() -> None:
     """The gains without an integrator; the tests of `check` and of its hints have the others."""
     checked = cmg_mj("check", "push_recovery", "--set", "controller.gains=[35, 4, -1, 0]")
-    assert "  MARGINAL with the reduced model" in checked.out
+    assert "true state: MARGINAL" in checked.out
