@@ -197,7 +197,7 @@ def draw_map(a_map: Map, observers: Sequence[str], across: VariedField, up: Vari
         axis.set_ticks(range(0, len(marks), step), [f"{mark:g}" for mark in marks[::step]])
     for axes in grid.flat:
         axes.tick_params(labelbottom=True)  # a hidden panel below would take the labels with it
-    figure.supxlabel(across.field)
-    figure.supylabel(up.field)
-    figure.legend(handles=handles, loc="outside upper right", ncols=3)
+    best.set_xlabel(across.field)
+    best.set_ylabel(up.field)
+    figure.legend(handles=handles, loc="outside lower right", ncols=3)
     return figure
