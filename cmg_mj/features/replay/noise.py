@@ -247,7 +247,11 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
     """
     noises, shown, gimbal = noises or {}, log.white_noise, Encoder().sample_sigma
     own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
-    if log.tilt is None:
+    placed = log.options.rig.accelerometer
+    if log.tilt is not None and all(one.noise_m_s2 for one in placed) and placed:
+        angle = math.radians(log.options.rig.angle_noise_deg or TILT_NOISE_DEG)
+        return replace(log.tilt.noise(angle), gimbal=gimbal)
+    if log.tilt is None or log.tilt.has_angle:
         if "accelerometer" in noises:
             raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
         given = {name: math.radians(size) if name == "tilt" else size for name, size in noises.items()}
@@ -259,10 +263,10 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
         density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
         sigma = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density).sample_sigma
     elif "acceleration" not in own:
-        sigma = own["tilt"] / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+        sigma = own["tilt"] / log.tilt.noise().tilt
     else:
         return MeasurementNoise(**own, correlation=shown.correlation, gimbal=gimbal)
-    return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    return replace(log.tilt.scaled(sigma).noise(), gimbal=gimbal)
 
 
 def noise_numbers(text: str) -> dict[str, float]:
@@ -293,9 +297,9 @@ def noise_remarks(log: Log, noise: MeasurementNoise) -> list[str]:
     if log.scenario is not None:
         return []
     shown = log.white_noise
-    if log.tilt is not None:
+    if log.tilt is not None and not log.tilt.has_angle:
         density = 1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0)
-        of_tilt = 1.0 / (log.tilt.noise(1.0, STANDARD_GRAVITY).tilt * density)
+        of_tilt = 1.0 / (log.tilt.noise().tilt * density)
         return [_remark("accelerometer", noise.tilt, shown.tilt, of_tilt, "ug/rtHz")]
     lines = [_remark("tilt", noise.tilt, shown.tilt, math.degrees(1.0), "deg")]
     if shown.acceleration is not None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cmg_mj.core.errors import InputError, counted
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import (
     ACCELEROMETERS,
@@ -29,6 +29,7 @@ from cmg_mj.features.replay.log import (
     read_table,
 )
 from cmg_mj.features.replay.noise import smallest_step, white_noise_of
+from cmg_mj.features.replay.rig import PlacedAccelerometer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.stages.push import Window, inside, push_windows
@@ -109,7 +110,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
             f"{MAX_RADIUS_M:g} m"
         )
-    geometry = RadialTilt(inner, outer) if options.radii_m else None
+    geometry = _geometry(options)
     if not abs(options.delay_s) <= MAX_DELAY_S:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
@@ -121,7 +122,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
     clipped = _clipped_rows(signals, columns, notes)
-    measured = _measured(signals, geometry, notes)
+    measured = _measured(signals, geometry, options.rig.accelerometer, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
     joined = _join(segments)
     tilt = joined["y1_rad"]
@@ -258,12 +259,29 @@ def _clipped_rows(signals: Values, columns: Mapping[str, Column], notes: list[st
     return clipped
 
 
-def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
+def _geometry(options: ReadOptions) -> PlanarTilt | None:
+    """Return the accelerometers' geometry, if their places are known."""
+    placed, sigmas = [complex(*one.place_m) for one in options.rig.accelerometer], [1.0]
+    if options.radii_m:
+        placed = [complex(0.0, radius) for radius in options.radii_m]
+    elif all(one.noise_m_s2 for one in options.rig.accelerometer):
+        sigmas = [one.noise_m_s2 or 1.0 for one in options.rig.accelerometer]
+    if not placed:
+        return None
+    sigmas = tuple(sigmas) * (len(placed) // len(sigmas))
+    return PlanarTilt(tuple(placed), sigmas, STANDARD_GRAVITY, "tilt" in options.columns, options.rig.pivot_moves)
+
+
+def _measured(
+    signals: Values, geometry: PlanarTilt | None, placed: Sequence[PlacedAccelerometer], notes: list[str]
+) -> dict[str, np.ndarray]:
     """Return row by row the observers' measurements, by their names in a trajectory."""
     acceleration = signals.get("acceleration")
     if geometry is not None:
-        angle = np.asarray(geometry(*(signals[role] for role in ACCELEROMETERS)))
-        acceleration = np.asarray(geometry.acceleration(signals["inner_x"], signals["outer_x"]))
+        forces = [one.force(*(signals[heading] for heading in one.columns)) for one in placed] or [
+            signals[f"{which}_x"] + 1j * signals[f"{which}_z"] for which in ("inner", "outer")
+        ]
+        angle, acceleration = geometry(forces, signals.get("tilt"))
     else:
         angle = np.arctan2(-signals["ax"], signals["az"]) if "ax" in signals else signals["tilt"]
     measured = {"y1_rad": _unwrapped(angle, notes)}
