@@ -105,7 +105,7 @@ class PlanarTilt:
         """
         variance = 1.0 / float(np.sum(np.array(self.sigmas) ** -2.0))
         slope = variance / self._spread
-        height = float(self._weights @ np.array(self.places).imag)
+        height = float(self._weights @ np.imag(self.places))
         if not self.has_angle:
             tilt = math.sqrt(variance + slope * abs(self._weights @ np.array(self.places)) ** 2) / self.gravity
             common = slope * height / self.gravity

@@ -28,8 +28,8 @@ def forces(places: tuple[complex, ...], pivot: complex = 0.0) -> list[np.ndarray
     result = []
     for place in places:
         arm = turn @ [place.real, place.imag]
-        acceleration = ALPHA * np.array([arm[1], -arm[0]]) - RATE**2 * arm + [pivot.real, pivot.imag]
-        x, z = turn.T @ (acceleration + [0.0, G])
+        acceleration = ALPHA * np.array([arm[1], -arm[0]]) - RATE**2 * arm + np.array([pivot.real, pivot.imag])
+        x, z = turn.T @ (acceleration + np.array([0.0, G]))
         result.append(np.array([x + 1j * z]))
     return result
 

@@ -110,7 +110,7 @@ class ReadOptions:
     max_gap_s: float | None = None
     delay_s: float = 0.0
     radii_m: tuple[float, float] | None = None
-    rig: Rig = Rig()
+    rig: Rig = field(default_factory=Rig)
     time_range_s: tuple[float, float] | None = None
     windows_s: Sequence[Window] = ()
     delimiter: str = ","
