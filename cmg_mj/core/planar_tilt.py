@@ -88,10 +88,8 @@ class PlanarTilt:
         if tilt is not None and self._through_gravity:
             seen = seen - 1j * self.gravity * np.exp(1j * tilt)
         slope = (weights * self._arms.conj()) @ seen / self._spread
-        if tilt is None:
-            gravity = weights @ seen - slope * (weights @ np.array(self.places))
-            tilt = np.angle(gravity / 1j)
-        return tilt, -slope.imag
+        gravity = weights @ seen - slope * (weights @ np.array(self.places))
+        return np.angle(gravity / 1j) if tilt is None else tilt, -slope.imag
 
     def scaled(self, factor: float) -> PlanarTilt:
         """Return it with so many times the noise of every accelerometer."""

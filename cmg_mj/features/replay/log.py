@@ -64,6 +64,8 @@ class WhiteNoise(NamedTuple):
     sigma: float
     low: float
     high: float
+    doubt: str = ""
+    """Why it is no white floor, but the power of the upper band or the quantiser's."""
 
 
 class LogNoise(NamedTuple):

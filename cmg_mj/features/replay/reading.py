@@ -152,7 +152,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         notes=tuple(notes),
         options=replace(options, units={role: column.unit or "s" for role, column in columns.items()}),
         row_period_s=period,
-        white_noise=white_noise_of(segments, period, dt),
+        white_noise=white_noise_of(
+            segments, period, dt, 0.0 if geometry is None or geometry.has_angle else geometry.noise().correlation
+        ),
     )
 
 
