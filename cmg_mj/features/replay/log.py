@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
+TORQUE_MOMENTUM = 1e6
+"""Momentum with which a known torque is a gimbal's rate [N m s]: so large that the gimbal hardly turns."""
 EVEN = 0.02
 """Deviation from an even grid, in periods, up to which stamps count as even."""
 
@@ -205,7 +207,7 @@ class Log:
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
 
 
-Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
+Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time", "torque"]
 
 _DEG, _TURN = math.pi / 180.0, 2.0 * math.pi
 _RATES = {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": _DEG, "dps": _DEG, "mdps": 1e-3 * _DEG}
@@ -216,8 +218,9 @@ UNITS: dict[Quantity, dict[str, float]] = {
     "angular acceleration": {"rad_s2": 1.0, "deg_s2": _DEG},
     "acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, **_FORCES},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "torque": {"n_m": 1.0, "mn_m": 1e-3},
 }
-"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2 or s. The first of each is that."""
+"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2, s or N m. The first of each is that."""
 _SPELLINGS = {
     "rad": "radian radians",
     "deg": "° degree degrees",
@@ -245,6 +248,7 @@ ROLES: dict[str, Quantity] = {
     "gimbal1": "angle",
     "gimbal2": "angle",
     "command": "rate",
+    "torque": "torque",
     "rate": "rate",
 }
 """Role -> quantity of its column.
@@ -252,7 +256,8 @@ ROLES: dict[str, Quantity] = {
 `tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
-`gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+`gimbal2`, whose half difference it is), `command` their rate, `torque` a known torque that tilts the rig instead of
+gimbals, `rate` the reference.
 """
 
 _ASSIGNMENT = re.compile(
@@ -331,6 +336,8 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         raise InputError("--columns: the accelerometers show the angular acceleration; leave acceleration out")
     if names.keys() & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
         raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
+    if "torque" in names and names.keys() & {"gimbal", "gimbal1", "command"}:
+        raise InputError("--columns: name either a torque, or gimbal and command")
     found = {role: _column(role, name, options) for role, name in names.items()}
     for accelerometer in options.rig.accelerometer:
         size = UNITS["acceleration"].get(_plain(accelerometer.unit))

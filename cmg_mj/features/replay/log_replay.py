@@ -15,7 +15,7 @@ from cmg_mj.core.errors import InputError, counted, raised
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STATE_SIGNALS, extra_signals, needs
-from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log import REFERENCE, TORQUE_MOMENTUM, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import SPAN_S, Alignment, alignment_of
 from cmg_mj.features.replay.scores import rms, scores
@@ -48,6 +48,8 @@ NUMBERS = {
     "gimbal_inertia": "what the gimbals' turn by 90 degrees adds to the inertia, J2 [kg m^2]",
 }
 """Numbers of `--model`. The first two are required; the others are 0 for a pendulum without gimbals."""
+EXACTLY = 1e-9
+"""White noise of the gimbal that a known torque stands for, in the observers' own field [rad]."""
 SEED = 0
 """Seed of the noise for noise gains."""
 
@@ -133,6 +135,10 @@ def replay_log(
         InputError: An observer does not exist or refuses its parameters, or nothing is left to score.
     """
     noise, parameters = noise or noise_of(log), dict(parameters or {})
+    if model and "torque" in log.options.columns:
+        if model.J_d * model.omega_d:
+            raise InputError("--columns torque: the model has a momentum, which is of gimbals: leave it out")
+        model = replace(model, J_d=TORQUE_MOMENTUM, omega_d=1.0)
     if not 0.0 <= settle_s < math.inf:
         raise InputError(f"--settle-s {settle_s:g}: must be a number of seconds not below 0")
     scored = log.scored(settle_s)
@@ -182,6 +188,8 @@ def _ready(
         own, start = dict(parameters.get(name, {})), OBSERVER_CLASSES.takes(name).get("rate_start")
         if start is not None and log.scenario is None:  # a log may begin in the middle of a motion
             own.setdefault("rate_start", max(start.default, _rate_of(log)))
+        if "torque" in log.options.columns and "gimbal_white" in OBSERVER_CLASSES.takes(name):
+            own.setdefault("gimbal_white", EXACTLY)
         try:
             ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **own)
         except InputError as error:

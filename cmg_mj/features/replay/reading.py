@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError, counted
+from cmg_mj.core.errors import InputError, counted, nearest
 from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import (
@@ -20,6 +20,7 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
+    TORQUE_MOMENTUM,
     Column,
     Log,
     ReadOptions,
@@ -121,9 +122,15 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
+    for role, delay in options.rig.delays_s.items():
+        if role not in signals:
+            raise InputError(f"delays_s.{role}: there is no such column; {nearest(role, signals)}")
+        signals[role] = _earlier(time, signals[role], delay)
     clipped = _clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, options.rig.accelerometer, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
+    if "torque" in signals:
+        segments = [_turned(segment, dt) for segment in segments]
     joined = _join(segments)
     tilt = joined["y1_rad"]
     if np.ptp(tilt) == 0.0:
@@ -295,6 +302,8 @@ def _measured(
         measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
     if "command" in signals:
         measured[HELD] = signals["command"]
+    if "torque" in signals:  # of f2 in (4) it is u times a momentum, at upright gimbals
+        return {**measured, HELD: signals["torque"] / TORQUE_MOMENTUM, "y2_rad": 0.0 * signals["torque"]}
     if ("y2_rad" in measured) != (HELD in measured):
         notes.append("observers that need the gimbals need both gimbal and command; there is one of them")
     return measured
@@ -512,6 +521,17 @@ def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
 
 def _select(values: Values, rows: slice | np.ndarray) -> dict[str, np.ndarray]:
     return {name: column[rows] for name, column in values.items()}
+
+
+def _turned(segment: Segment, dt: float) -> Segment:
+    """Return a segment with the angle of the gimbal that a known torque stands for."""
+    return replace(segment, values={**segment.values, "y2_rad": dt * np.cumsum([0.0, *segment.values[HELD][:-1]])})
+
+
+def _earlier(time: np.ndarray, values: np.ndarray, delay_s: float) -> np.ndarray:
+    """Return what a column that comes so late shows at each row; NaN where it does not say [s]."""
+    known = np.isfinite(time) & np.isfinite(values)
+    return np.interp(time + delay_s, time[known], values[known], math.nan, math.nan)
 
 
 def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:

@@ -63,6 +63,8 @@ class Rig(BaseModel):
     model_config = FORBID
     log: dict[str, Any] = {}
     """Options of reading its logs, by their names in Python: columns, units, scale, offset, rate_hz, ..."""
+    delays_s: dict[str, float] = {}
+    """Role, or heading of an accelerometer's column -> by how much it comes late [s]."""
     accelerometer: tuple[PlacedAccelerometer, ...] = ()
     pivot_moves: bool = False
     angle_noise_deg: Positive | None = None
