@@ -22,6 +22,7 @@ from cmg_mj.features.replay.scores import rms, scores
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.parameter_options import Parameters, numbers
+from cmg_mj.observers.scaling import scaled_parameters
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
 from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
@@ -190,6 +191,8 @@ def _ready(
             own.setdefault("rate_start", max(start.default, _rate_of(log)))
         if "torque" in log.options.columns and "gimbal_white" in OBSERVER_CLASSES.takes(name):
             own.setdefault("gimbal_white", EXACTLY)
+        if model and model.gravity_torque > 0.0 and log.scenario is None:  # the papers' are for their rig
+            own = scaled_parameters(name, model) | own
         try:
             ready[name] = make_observer(name, log.dt, model or NO_MODEL, noise, **own)
         except InputError as error:
