@@ -37,11 +37,16 @@ if TYPE_CHECKING:
 
 _OPTIONS = (
     click.option(
+        "--rig",
+        metavar="FILE",
+        help="A rig file: places and errors of accelerometers, columns, the pendulum. Other options replace its own.",
+    ),
+    click.option(
         "--columns",
         multiple=True,
         metavar="ROLE=HEADING,...",
         help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
-        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2) and command, or torque. Not for a run's own recording.",
     ),
     click.option(
         "--units",
@@ -104,9 +109,11 @@ def log_options(command: Command) -> Command:
     @functools.wraps(command)
     def with_options(**given: Any) -> None:
         from cmg_mj.features.replay.log import ReadOptions, assignments
+        from cmg_mj.features.replay.rig import Rig, load_rig
         from cmg_mj.observers.parameter_options import finite
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
+        rig = options["rig"] = Rig() if options["rig"] is None else load_rig(options["rig"])
         for name in ("columns", "units"):
             options[name] = assignments(options[name], f"--{name}")
         for name in ("scale", "offset"):
@@ -116,6 +123,12 @@ def log_options(command: Command) -> Command:
             options["radii_m"] = pair(options["radii_m"], ",", "--radii", "INNER,OUTER, such as 0.05,0.15")
         if options["time_range_s"] is not None:
             options["time_range_s"] = span(options["time_range_s"], "--time-range")
+        usual = vars(ReadOptions())
+        for name, value in rig.log.items():
+            if isinstance(value, dict):
+                options[name] = value | options[name]
+            elif options[name] == usual[name]:
+                options[name] = value
         command(options=ReadOptions(**options), **given)
 
     return all_of(*_OPTIONS)(with_options)
@@ -197,7 +210,7 @@ def replay(
     for kind in parameters:
         if kind not in observers:
             raise InputError(f"--set {kind}: is not among --observers {','.join(observers)}")
-    pendulum = None if model is None else model_of(model)
+    pendulum = options.rig.model if model is None else model_of(model)
     recordings = read_logs(logs, options)
     names, total = distinct_names(log.name for log in recordings), len(recordings)
     request = {"observers": observers, "model": model, "parameters": parameters, "noise": noises, "settle_s": settle_s}

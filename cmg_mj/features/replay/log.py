@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.features.replay.rig import Rig
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.stages.push import Window
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 REFERENCE = "reference_rad_s"
 """The column of the rate that estimates are judged against; NaN where it is not known."""
+TORQUE_MOMENTUM = 1e6
+"""Momentum with which a known torque is a gimbal's rate [N m s]: so large that the gimbal hardly turns."""
 EVEN = 0.02
 """Deviation from an even grid, in periods, up to which stamps count as even."""
 
@@ -63,6 +66,8 @@ class WhiteNoise(NamedTuple):
     sigma: float
     low: float
     high: float
+    doubt: str = ""
+    """Why it is no white floor, but the power of the upper band or the quantiser's."""
 
 
 class LogNoise(NamedTuple):
@@ -93,6 +98,7 @@ class ReadOptions:
         max_gap_s: Longer gaps part the log; by default those of more than five rows [s].
         delay_s: Lag of the reference behind the other signals [s].
         radii_m: Distances of two accelerometers from the pivot, the inner first [m].
+        rig: Accelerometers at other places, with columns of their own, and what is known of the rig beside.
         time_range_s: Start and end of the part to read, from the first row on [s].
         windows_s: Windows that are scored separately, in the log's own time [s].
         delimiter: Character between the cells of a CSV.
@@ -108,6 +114,7 @@ class ReadOptions:
     max_gap_s: float | None = None
     delay_s: float = 0.0
     radii_m: tuple[float, float] | None = None
+    rig: Rig = field(default_factory=Rig)
     time_range_s: tuple[float, float] | None = None
     windows_s: Sequence[Window] = ()
     delimiter: str = ","
@@ -117,6 +124,7 @@ class ReadOptions:
     def as_toml(self) -> dict[str, TomlValue]:
         """Return the options that are not the defaults, as TOML holds them."""
         defaults, options = vars(ReadOptions()), {**vars(self), "windows_s": tuple(self.windows_s)}
+        options["rig"] = self.rig if self.rig == Rig() else self.rig.model_dump(exclude_defaults=True, mode="json")
         return {name: value for name, value in options.items() if value != defaults[name]}
 
 
@@ -131,7 +139,7 @@ class Log:
             the log lacks a signal, y2 and u are zero, the others NaN.
         parts: Slices without a gap; the observers start at the beginning of each.
         has: Signals of the log among "gimbals" (y2 and u), "acceleration" and "reference".
-        tilt: Geometry of the two accelerometers, if they measure the tilt.
+        tilt: Geometry of the accelerometers, if their places are known.
         windows: Windows that are scored separately [s].
         notes: Changes to the rows that were not requested, and likely mistakes, a line each.
         options: Options with which it was read, the units of all columns among them.
@@ -145,7 +153,7 @@ class Log:
     columns: Mapping[str, np.ndarray]
     parts: Sequence[slice]
     has: frozenset[str]
-    tilt: RadialTilt | None = None
+    tilt: PlanarTilt | None = None
     windows: Sequence[Window] = ()
     notes: Sequence[str] = ()
     options: ReadOptions = ReadOptions()
@@ -199,7 +207,7 @@ class Log:
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
 
 
-Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time"]
+Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time", "torque"]
 
 _DEG, _TURN = math.pi / 180.0, 2.0 * math.pi
 _RATES = {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": _DEG, "dps": _DEG, "mdps": 1e-3 * _DEG}
@@ -210,8 +218,9 @@ UNITS: dict[Quantity, dict[str, float]] = {
     "angular acceleration": {"rad_s2": 1.0, "deg_s2": _DEG},
     "acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, **_FORCES},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "torque": {"n_m": 1.0, "mn_m": 1e-3},
 }
-"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2 or s. The first of each is that."""
+"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2, s or N m. The first of each is that."""
 _SPELLINGS = {
     "rad": "radian radians",
     "deg": "° degree degrees",
@@ -239,6 +248,7 @@ ROLES: dict[str, Quantity] = {
     "gimbal1": "angle",
     "gimbal2": "angle",
     "command": "rate",
+    "torque": "torque",
     "rate": "rate",
 }
 """Role -> quantity of its column.
@@ -246,7 +256,8 @@ ROLES: dict[str, Quantity] = {
 `tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
-`gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+`gimbal2`, whose half difference it is), `command` their rate, `torque` a known torque that tilts the rig instead of
+gimbals, `rate` the reference.
 """
 
 _ASSIGNMENT = re.compile(
@@ -318,13 +329,22 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
             if role not in names:
                 raise InputError(f"--{option} {role}: there is no such column; --columns names {', '.join(names)}")
     sources = [source for source in (("tilt",), ONE_ACCELEROMETER, ACCELEROMETERS) if names.keys() & set(source)]
-    if len(sources) != 1 or not names.keys() >= set(sources[0]):
+    angle_beside = options.rig.accelerometer and sources in ([], [("tilt",)])
+    if not angle_beside and (len(sources) != 1 or not names.keys() >= set(sources[0])):
         raise InputError("--columns: name the tilt, or ax and az, or inner_x, inner_z, outer_x and outer_z")
-    if "acceleration" in names and sources[0] == ACCELEROMETERS:
-        raise InputError("--columns: two accelerometers show the angular acceleration; leave acceleration out")
+    if "acceleration" in names and (options.rig.accelerometer or sources[0] == ACCELEROMETERS):
+        raise InputError("--columns: the accelerometers show the angular acceleration; leave acceleration out")
     if names.keys() & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
         raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
-    return {role: _column(role, name, options) for role, name in names.items()}
+    if "torque" in names and names.keys() & {"gimbal", "gimbal1", "command"}:
+        raise InputError("--columns: name either a torque, or gimbal and command")
+    found = {role: _column(role, name, options) for role, name in names.items()}
+    for accelerometer in options.rig.accelerometer:
+        size = UNITS["acceleration"].get(_plain(accelerometer.unit))
+        if size is None:
+            raise InputError(f"accelerometer.unit = {accelerometer.unit!r}: {nearest(accelerometer.unit, _FORCES)}")
+        found |= {heading: Column(heading, accelerometer.unit, size, 0.0) for heading in accelerometer.columns}
+    return found
 
 
 def _column(role: str, name: str, options: ReadOptions) -> Column:

@@ -15,13 +15,14 @@ from cmg_mj.core.errors import InputError, counted, raised
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STATE_SIGNALS, extra_signals, needs
-from cmg_mj.features.replay.log import REFERENCE, Log
+from cmg_mj.features.replay.log import REFERENCE, TORQUE_MOMENTUM, Log
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reference import SPAN_S, Alignment, alignment_of
 from cmg_mj.features.replay.scores import rms, scores
 from cmg_mj.inputs.users_line import users_line
 from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observer
 from cmg_mj.observers.parameter_options import Parameters, ParameterValue, numbers
+from cmg_mj.observers.scaling import scaled_parameters
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
 from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
@@ -48,6 +49,8 @@ NUMBERS = {
     "gimbal_inertia": "what the gimbals' turn by 90 degrees adds to the inertia, J2 [kg m^2]",
 }
 """Numbers of `--model`. The first two are required; the others are 0 for a pendulum without gimbals."""
+EXACTLY = 1e-9
+"""White noise of the gimbal that a known torque stands for, in the observers' own field [rad]."""
 SEED = 0
 """Seed of the noise for noise gains."""
 
@@ -133,6 +136,10 @@ def replay_log(
         InputError: An observer does not exist or refuses its parameters, or nothing is left to score.
     """
     noise, parameters = noise or noise_of(log), dict(parameters or {})
+    if model and "torque" in log.options.columns:
+        if model.J_d * model.omega_d:
+            raise InputError("--columns torque: the model has a momentum, which is of gimbals: leave it out")
+        model = replace(model, J_d=TORQUE_MOMENTUM, omega_d=1.0)
     if not 0.0 <= settle_s < math.inf:
         raise InputError(f"--settle-s {settle_s:g}: must be a number of seconds not below 0")
     scored = log.scored(settle_s)
@@ -195,9 +202,11 @@ def observer_on(
     log: Log, name: str, model: ReducedModel | None, noise: MeasurementNoise, **parameters: ParameterValue
 ) -> Observer:
     """Make an observer for a log; without a `rate_start` it takes the log's, since a log may begin in a motion."""
-    start = OBSERVER_CLASSES.takes(name).get("rate_start")
-    if start is not None and log.scenario is None:
-        parameters.setdefault("rate_start", max(start.default, _rate_of(log)))
+    takes = OBSERVER_CLASSES.takes(name)
+    if "rate_start" in takes and log.scenario is None:
+        parameters.setdefault("rate_start", max(takes["rate_start"].default, _rate_of(log)))
+    if "gimbal_white" in takes and "torque" in log.options.columns:
+        parameters.setdefault("gimbal_white", EXACTLY)
     return make_observer(name, log.dt, model or NO_MODEL, noise, **parameters)
 
 
@@ -294,6 +303,9 @@ def observer_inputs(
     """
     noises, parameters = noises or {}, dict(parameters or {})
     if log.scenario is None:
+        if model and model.gravity_torque > 0.0:  # the papers' parameters are for their rig
+            scaled = {kind: scaled_parameters(kind, model) for kind in OBSERVERS}
+            parameters = {kind: {**scaled.get(kind, {}), **parameters.get(kind, {})} for kind in {**scaled, **parameters}}
         return ObserverInputs(model, noise_of(log, noises), parameters)
     part = prepare(parse_scenario(dict(log.scenario), log.name)).require_single_axis("replay")
     scenario, plant, loop = part.scenario, part.plant.parameters, part.scenario.observer

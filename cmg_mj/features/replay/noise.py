@@ -55,6 +55,8 @@ COARSE = 0.6
 half a step on, to which a twelfth of the step's square is added."""
 HARDLY = 1e-6
 """Noise below this share of the signal is rounding."""
+AGREEING = 16384
+"""Samples of a segment of the spectrum in which tilt and acceleration are compared."""
 GROUPS = 16
 """Groups of segments whose scatter shows the error of the estimate, if it is larger than that of Gaussian noise."""
 
@@ -68,7 +70,7 @@ APART = 1.5
 """Ratio of the noise that is used and the noise that the log shows, from which it is reported."""
 
 
-def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> LogNoise:
+def white_noise_of(segments: Sequence[Segment], period: float, dt: float, correlation: float = 0.0) -> LogNoise:
     """Estimate the white noise of a log's tilt and angular acceleration.
 
     Resampling to a quicker rate keeps the density at low frequencies: white noise of that density is larger, sample for
@@ -78,6 +80,7 @@ def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> Log
         segments: The log's segments, with the file's own rows.
         period: Period of these rows [s].
         dt: Sample period [s].
+        correlation: Of both by the accelerometers' places, where no white floor shows it.
 
     Returns:
         The noise of one sample.
@@ -105,8 +108,57 @@ def white_noise_of(segments: Sequence[Segment], period: float, dt: float) -> Log
     factor = math.sqrt(max(1.0, period / dt))
     ends = (np.abs(spectra) ** 2, np.min(steps, axis=0), np.max(sizes, axis=0))
     tilt, acceleration, *_ = [*map(partial(_floor, factor), *ends), None]
-    known = isinstance(tilt, WhiteNoise) and isinstance(acceleration, WhiteNoise)
-    return LogNoise(tilt, acceleration, _correlation(spectra) if known else 0.0)
+    if all(isinstance(noise, WhiteNoise) and not noise.doubt for noise in (tilt, acceleration)):
+        return LogNoise(tilt, acceleration, _correlation(spectra))
+    if acceleration is not None:
+        return LogNoise(*_agreeing(segments, dt, correlation), correlation)
+    return LogNoise(tilt, None, 0.0)
+
+
+def _agreeing(segments: Sequence[Segment], dt: float, correlation: float) -> tuple[WhiteNoise, WhiteNoise]:
+    """Find the white noises with which tilt and acceleration agree, whatever the motion.
+
+    Where the acceleration runs straight between samples, the motion cancels in the second difference of y1 less h^2/6
+    (a- + 4 a + a+), and the noise v of y1 and n of a leave, at the frequency w,
+
+        (2 - 2 cos w)^2 vv + (h^2 (4 + 2 cos w)/6)^2 nn + 2 (2 - 2 cos w) h^2 (4 + 2 cos w)/6 vn.
+
+    Both are the likeliest (P. Whittle, "Estimation and information in stationary time series", Arkiv for Matematik 2,
+    1953). What else keeps the two signals apart, such as vibration or a delay, counts as their noise.
+    """
+    from scipy.optimize import minimize
+    from scipy.signal import welch
+
+    pieces = [(one.values["y1_rad"], one.values["acceleration_rad_s2"]) for one in segments]
+    rests = [np.diff(y, 2) - dt * dt / 6.0 * (a[2:] + 4.0 * a[1:-1] + a[:-2]) for y, a in pieces]
+    length = min(AGREEING, max(map(len, rests)))
+    powers = [welch(rest, nperseg=length, window="hann")[1] for rest in rests if len(rest) >= length]
+    power = np.average(powers, axis=0, weights=[len(rest) for rest in rests if len(rest) >= length])[3:]
+    cosine = np.cos(2.0 * math.pi * np.arange(3, len(power) + 3) / length)
+    of_tilt, of_acceleration = 2.0 - 2.0 * cosine, dt * dt * (4.0 + 2.0 * cosine) / 6.0
+
+    def shares(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the density by these noises' logarithms, and its parts by each."""
+        v, n = of_tilt * math.exp(sizes[0]), of_acceleration * math.exp(sizes[1])
+        parts = 2.0 * np.stack([v * v + correlation * v * n, n * n + correlation * v * n])
+        return parts.sum(axis=0), parts
+
+    def unlikely(sizes: np.ndarray) -> float:
+        model, _ = shares(sizes)
+        return float(np.sum(np.log(model) + power / model))
+
+    top = math.sqrt(float(power[-len(power) // 4 :].mean()) / 32.0) + 1e-12
+    start = np.log([top, math.sqrt(float(power[: len(power) // 8].mean()) / 2.0) / dt**2 + 1e-12])
+    found = minimize(unlikely, start, method="Nelder-Mead").x
+    model, parts = shares(found)
+    slopes = 2.0 * parts / model  # of the density's logarithm by both noises': Fisher's information
+    n_segments = sum(map(len, rests)) / length / 1.94  # neighbours behind Hann's window correlate
+    errors = 1.96 * np.sqrt(np.diag(np.linalg.pinv(n_segments * slopes @ slopes.T)))
+    tilt, acceleration = (
+        WhiteNoise(*np.exp(size + error * np.array([0, -1, 1])).tolist())
+        for size, error in zip(found, errors, strict=True)
+    )
+    return tilt, acceleration
 
 
 def smallest_step(values: np.ndarray) -> float:
@@ -187,7 +239,8 @@ def _floor(factor: float, power: np.ndarray, step: float, size: float) -> WhiteN
     if top < HARDLY * size:
         return "there is hardly any"
     if top < COARSE * step < math.inf:
-        return f"it is below {COARSE:g} of the signal's smallest step"
+        steps = step / math.sqrt(12.0)
+        return WhiteNoise(steps, steps, steps, f"it is below {COARSE:g} of the signal's smallest step")
     frequencies = np.arange(power.shape[1]) * 2.0 / SEGMENT
     bands = [power[:, (frequencies >= low) & (frequencies < low + 0.1) & (frequencies < 1.0)] for low in BANDS]
     levels = np.array([0.5 * math.log(max(float(band.mean()), 1e-300)) for band in bands])
@@ -208,7 +261,9 @@ def _floor(factor: float, power: np.ndarray, step: float, size: float) -> WhiteN
             if np.sum((floor - floor.mean()) ** 2) > (len(order) - 1 + 3.3 * math.sqrt(2 * len(order) - 2)) * each**2:
                 low, high = min(low, math.exp(floor.min())), max(high, math.exp(floor.max()))
             return WhiteNoise(factor * sigma, factor * low, factor * high)
-    return "there is no white floor below half the row rate, as of a filtered or fused signal"
+    doubt = "there is no white floor below half the row rate, as of a filtered or fused signal"
+    sigma = factor * top
+    return WhiteNoise(sigma, sigma, sigma, doubt)
 
 
 def _error(power: np.ndarray, share: float) -> float:
@@ -247,7 +302,11 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
     """
     noises, shown, gimbal = noises or {}, log.white_noise, Encoder().sample_sigma
     own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
-    if log.tilt is None:
+    placed = log.options.rig.accelerometer
+    if log.tilt is not None and all(one.noise_m_s2 for one in placed) and placed:
+        angle = math.radians(log.options.rig.angle_noise_deg or TILT_NOISE_DEG)
+        return replace(log.tilt.noise(angle), gimbal=gimbal)
+    if log.tilt is None or log.tilt.has_angle:
         if "accelerometer" in noises:
             raise InputError("--noise accelerometer: the tilt is not that of two accelerometers; give tilt [deg]")
         given = {name: math.radians(size) if name == "tilt" else size for name, size in noises.items()}
@@ -259,10 +318,10 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
         density = noises.get("accelerometer", NOISE_DENSITY_UG_RTHZ)
         sigma = Accelerometer(rate_hz=_sampling_rate(log), noise_density_ug_rthz=density).sample_sigma
     elif "acceleration" not in own:
-        sigma = own["tilt"] / log.tilt.noise(1.0, STANDARD_GRAVITY).tilt
+        sigma = own["tilt"] / log.tilt.noise().tilt
     else:
         return MeasurementNoise(**own, correlation=shown.correlation, gimbal=gimbal)
-    return replace(log.tilt.noise(sigma, STANDARD_GRAVITY), gimbal=gimbal)
+    return replace(log.tilt.scaled(sigma).noise(), gimbal=gimbal)
 
 
 def noise_numbers(text: str) -> dict[str, float]:
@@ -293,9 +352,9 @@ def noise_remarks(log: Log, noise: MeasurementNoise) -> list[str]:
     if log.scenario is not None:
         return []
     shown = log.white_noise
-    if log.tilt is not None:
+    if log.tilt is not None and not log.tilt.has_angle:
         density = 1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0)
-        of_tilt = 1.0 / (log.tilt.noise(1.0, STANDARD_GRAVITY).tilt * density)
+        of_tilt = 1.0 / (log.tilt.noise().tilt * density)
         return [_remark("accelerometer", noise.tilt, shown.tilt, of_tilt, "ug/rtHz")]
     lines = [_remark("tilt", noise.tilt, shown.tilt, math.degrees(1.0), "deg")]
     if shown.acceleration is not None:
@@ -308,8 +367,10 @@ def _remark(name: str, used: float, shown: WhiteNoise | str, factor: float, unit
     start = f"Noise of the {name}: {factor * used:.3g} {unit} is used; the log"
     if isinstance(shown, str):
         return f"{start} cannot tell: {shown}."
-    sigma, low, high = (factor * size for size in shown)
+    sigma, low, high = (factor * size for size in shown[:3])
     remark = f"{start} shows {sigma:.3g} ({low:.3g} to {high:.3g})"
+    if shown.doubt:
+        remark = f"{start}'s upper band shows {sigma:.3g}, but {shown.doubt}"
     if 1.0 / APART < shown.sigma / used < APART:
         return f"{remark}."
     return f"{remark}: give --noise {name}={sigma:.3g}, or no {name} for the log's own."

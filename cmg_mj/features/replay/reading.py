@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmg_mj.core.errors import InputError, counted
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.errors import InputError, counted, nearest
+from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.clipping import clipped_rows
 from cmg_mj.features.replay.log import (
@@ -21,6 +21,7 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
+    TORQUE_MOMENTUM,
     Log,
     ReadOptions,
     Segment,
@@ -29,6 +30,7 @@ from cmg_mj.features.replay.log import (
     read_table,
 )
 from cmg_mj.features.replay.noise import white_noise_of
+from cmg_mj.features.replay.rig import PlacedAccelerometer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.stages.push import Window, inside, push_windows
@@ -105,7 +107,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             f"--radii {inner:g},{outer:g}: must be two distances from the pivot, the smaller first, at most "
             f"{MAX_RADIUS_M:g} m"
         )
-    geometry = RadialTilt(inner, outer) if options.radii_m else None
+    geometry = _geometry(options)
     if not abs(options.delay_s) <= MAX_DELAY_S:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
@@ -116,10 +118,16 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
+    for role, delay in options.rig.delays_s.items():
+        if role not in signals:
+            raise InputError(f"delays_s.{role}: there is no such column; {nearest(role, signals)}")
+        signals[role] = _earlier(time, signals[role], delay)
     clipped = clipped_rows(signals, columns, notes)
-    measured = _measured(signals, geometry, notes)
+    measured = _measured(signals, geometry, options.rig.accelerometer, notes)
     time = _unrounded(time, measured["y1_rad"], notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
+    if "torque" in signals:
+        segments = [_turned(segment, dt) for segment in segments]
     joined = _join(segments)
     tilt = joined["y1_rad"]
     if np.ptp(tilt) == 0.0:
@@ -148,7 +156,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         notes=tuple(notes),
         options=replace(options, units={role: column.unit or "s" for role, column in columns.items()}),
         row_period_s=period,
-        white_noise=white_noise_of(segments, period, dt),
+        white_noise=white_noise_of(
+            segments, period, dt, 0.0 if geometry is None or geometry.has_angle else geometry.noise().correlation
+        ),
     )
 
 
@@ -224,12 +234,29 @@ def _times(
     return counted[: rows.sum()] if time is None else time[rows], _select(signals, rows)
 
 
-def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) -> dict[str, np.ndarray]:
+def _geometry(options: ReadOptions) -> PlanarTilt | None:
+    """Return the accelerometers' geometry, if their places are known."""
+    placed, sigmas = [complex(*one.place_m) for one in options.rig.accelerometer], [1.0]
+    if options.radii_m:
+        placed = [complex(0.0, radius) for radius in options.radii_m]
+    elif all(one.noise_m_s2 for one in options.rig.accelerometer):
+        sigmas = [one.noise_m_s2 or 1.0 for one in options.rig.accelerometer]
+    if not placed:
+        return None
+    sigmas = tuple(sigmas) * (len(placed) // len(sigmas))
+    return PlanarTilt(tuple(placed), sigmas, STANDARD_GRAVITY, "tilt" in options.columns, options.rig.pivot_moves)
+
+
+def _measured(
+    signals: Values, geometry: PlanarTilt | None, placed: Sequence[PlacedAccelerometer], notes: list[str]
+) -> dict[str, np.ndarray]:
     """Return row by row the observers' measurements, by their names in a trajectory."""
     acceleration = signals.get("acceleration")
     if geometry is not None:
-        angle = np.asarray(geometry(*(signals[role] for role in ACCELEROMETERS)))
-        acceleration = np.asarray(geometry.acceleration(signals["inner_x"], signals["outer_x"]))
+        forces = [one.force(*(signals[heading] for heading in one.columns)) for one in placed] or [
+            signals[f"{which}_x"] + 1j * signals[f"{which}_z"] for which in ("inner", "outer")
+        ]
+        angle, acceleration = geometry(forces, signals.get("tilt"))
     else:
         angle = np.arctan2(-signals["ax"], signals["az"]) if "ax" in signals else signals["tilt"]
     measured = {"y1_rad": _unwrapped(angle, notes)}
@@ -241,6 +268,8 @@ def _measured(signals: Values, geometry: RadialTilt | None, notes: list[str]) ->
         measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
     if "command" in signals:
         measured[HELD] = signals["command"]
+    if "torque" in signals:  # of f2 in (4) it is u times a momentum, at upright gimbals
+        return {**measured, HELD: signals["torque"] / TORQUE_MOMENTUM, "y2_rad": 0.0 * signals["torque"]}
     if ("y2_rad" in measured) != (HELD in measured):
         notes.append("observers that need the gimbals need both gimbal and command; there is one of them")
     return measured
@@ -481,6 +510,17 @@ def _is_even(time: np.ndarray, period: float, resolution: float) -> bool:
 
 def _select(values: Values, rows: slice | np.ndarray) -> dict[str, np.ndarray]:
     return {name: column[rows] for name, column in values.items()}
+
+
+def _turned(segment: Segment, dt: float) -> Segment:
+    """Return a segment with the angle of the gimbal that a known torque stands for."""
+    return replace(segment, values={**segment.values, "y2_rad": dt * np.cumsum([0.0, *segment.values[HELD][:-1]])})
+
+
+def _earlier(time: np.ndarray, values: np.ndarray, delay_s: float) -> np.ndarray:
+    """Return what a column that comes so late shows at each row; NaN where it does not say [s]."""
+    known = np.isfinite(time) & np.isfinite(values)
+    return np.interp(time + delay_s, time[known], values[known], math.nan, math.nan)
 
 
 def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:

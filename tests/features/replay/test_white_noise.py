@@ -10,7 +10,7 @@ from scipy.signal import butter, lfilter, sosfilt
 
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.features.replay.log import LogNoise, Segment, WhiteNoise
-from cmg_mj.features.replay.noise import white_noise_of
+from cmg_mj.features.replay.noise import _agreeing, white_noise_of
 
 DT, SIGMA, N = 0.005, 0.004, 4000
 CLOCK = DT * np.arange(N)
@@ -26,7 +26,7 @@ def noise_of_rows(t: np.ndarray, *parts: slice, **signals: np.ndarray) -> LogNoi
     segments = []
     for part in parts or [slice(None)]:
         rows = {name: values[part] for name, values in signals.items()}
-        segments.append(Segment(t[part], {}, t[part], t[part], rows))
+        segments.append(Segment(t[part], rows, t[part], t[part], rows))
     return white_noise_of(segments, DT, DT)
 
 
@@ -161,4 +161,20 @@ def test_what_follows_from_the_command_is_no_noise_of_the_acceleration() -> None
         u[k] = -0.8 * (true[k] + n[k])
     y = motion(CLOCK) + white(random)
     assert_size(noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n, u_rad_s=u).acceleration, 0.4)
-    assert isinstance(noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n).acceleration, str)
+    assert_size(noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n + 0.3 * np.sin(20.0 * CLOCK)).tilt, SIGMA)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_tilt_and_acceleration_agree_at_their_noise_where_vibration_hides_a_floor(correlation: float) -> None:
+    """Of many intervals 95 % hold the truth; the motion moves both and cancels."""
+    hits, worlds = np.zeros(2), 40
+    for seed in range(worlds):
+        random = np.random.default_rng(seed)
+        v, other = random.standard_normal((2, N))
+        n = correlation * v + np.sqrt(1.0 - correlation**2) * other
+        moves = {"y1_rad": motion(CLOCK), "acceleration_rad_s2": np.gradient(np.gradient(motion(CLOCK), DT), DT)}
+        noisy = {"y1_rad": SIGMA * v, "acceleration_rad_s2": 0.4 * n}
+        rows = {name: moves[name] + noisy[name] for name in moves}
+        found = _agreeing([Segment(CLOCK, rows, CLOCK, CLOCK, rows)], DT, correlation)
+        hits += [noise.low < size < noise.high for noise, size in zip(found, (SIGMA, 0.4), strict=True)]
+    assert (hits >= 0.85 * worlds).all()

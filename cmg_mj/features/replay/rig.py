@@ -1,0 +1,96 @@
+"""The file of a real rig: where its sensors sit, what is wrong with them, how its logs are read, its pendulum."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, Field, ValidationError
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.inputs.files import read_toml
+from cmg_mj.inputs.messages import complaints
+from cmg_mj.inputs.types import Positive
+from cmg_mj.scenario.schema import FORBID
+
+Place = Annotated[float, Field(ge=-10.0, le=10.0)]
+"""Millimetres taken as metres are larger [m]."""
+
+
+class PlacedAccelerometer(BaseModel):
+    """An accelerometer with two axes in the tilting plane.
+
+    Its axes show, with across and up of the body as real and imaginary part of the specific force f,
+    scale * (the parts of f exp(-i angle)) + offset.
+    """
+
+    model_config = FORBID
+    columns: tuple[str, str]
+    """Headings of its first and its second axis."""
+    unit: str = "m_s2"
+    place_m: tuple[Place, Place]
+    """Across and up from the pivot, in axes that tilt with the body and are horizontal and vertical at a tilt of 0."""
+    angle_deg: float = 0.0
+    """Angle from the body's axis across, which points where a growing tilt moves the top, to its first axis."""
+    scale: tuple[float, float] = (1.0, 1.0)
+    """Factor of each axis; a negative one turns the axis round."""
+    offset_m_s2: tuple[float, float] = (0.0, 0.0)
+    noise_m_s2: Positive | None = None
+    """Standard deviation of a sample of an axis, which is alike in all if it is not given."""
+
+    def force(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the specific force in the body's axes by what both axes show, (n,) [m/s^2]."""
+        (s1, s2), (o1, o2) = self.scale, self.offset_m_s2
+        return ((first - o1) / s1 + 1j * (second - o2) / s2) * np.exp(1j * math.radians(self.angle_deg))
+
+
+class Pendulum(BaseModel):
+    """The numbers of `--model`."""
+
+    model_config = FORBID
+    inertia: Positive
+    gravity_torque: float
+    momentum: float = 0.0
+    gimbal_inertia: float = 0.0
+
+
+class Rig(BaseModel):
+    """A rig file."""
+
+    model_config = FORBID
+    log: dict[str, Any] = {}
+    """Options of reading its logs, by their names in Python: columns, units, scale, offset, rate_hz, ..."""
+    delays_s: dict[str, float] = {}
+    """Role, or heading of an accelerometer's column -> by how much it comes late [s]."""
+    accelerometer: tuple[PlacedAccelerometer, ...] = ()
+    pivot_moves: bool = False
+    angle_noise_deg: Positive | None = None
+    """Standard deviation of a sample of the angle sensor."""
+    pendulum: Pendulum | None = None
+
+    @property
+    def model(self) -> ReducedModel | None:
+        """The reduced model of its pendulum, if it is known."""
+        if self.pendulum is None:
+            return None
+        inertia, gravity_torque, momentum, added = self.pendulum.model_dump().values()
+        return ReducedModel(inertia, added, momentum, 1.0, gravity_torque)
+
+
+def load_rig(path: Path | str) -> Rig:
+    """Read a rig file.
+
+    Args:
+        path: A TOML file.
+
+    Raises:
+        InputError: The file is no TOML, or has a field that is unknown or not allowed.
+    """
+    fields = read_toml(Path(path), f"--rig {path}")
+    try:
+        return Rig.model_validate(fields)
+    except ValidationError as error:
+        raise InputError(f"--rig {path}: {'; '.join(complaints(Rig, error.errors(), fields))}") from error
