@@ -43,7 +43,7 @@ RUN_FIGURES = [key for key in KEYS if not key.startswith(BESIDE)]
 """Figures of the observer in the loop that `cmg-mj run` prints."""
 ABOUT_BASELINES = """\
 zero, an estimate of zero; mems_as_bought, a two-dollar gyro with its offset; mems_gyro, the same
-after a second at rest; mems_fused, as bought, in a Kalman filter with y1; floor_y1 and floor_accel,
+after a second at rest; mems_fused, in a Kalman filter with y1; floor_y1 and floor_accel,
 lower bounds on the error from the measured tilt, and from tilt and angular acceleration."""
 
 

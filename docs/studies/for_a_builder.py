@@ -30,7 +30,7 @@ from cmg_mj.results.result import Result
 from cmg_mj.results.tables import markdown_table
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
-WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}
+WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration", "gyro": "a gyro"}
 LOOP_OF_BASELINES = "gyro_free"
 HEADINGS = (
     "observer",
@@ -114,8 +114,9 @@ def main() -> None:
     rows += [
         [f"`{name}`", *errors(loop, name), means(gentle, name), "-", "-", "-", asked.get(name, "-")]
         for name in BASELINES
+        if name not in names
     ]
-    print(f"{worlds} worlds; the last {len(BASELINES)} rows are open loop, in the loop of {LOOP_OF_BASELINES}\n")
+    print(f"{worlds} worlds; baselines are open loop, in the loop of {LOOP_OF_BASELINES}\n")
     print(markdown_table(list(HEADINGS), rows))
 
 
