@@ -86,11 +86,13 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
-    vector = format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist())
+    vector = format_test_vector(
+        name, precision, samples.tolist(), expected.tolist(), allowed.tolist(), check.reads_gyro(controller)
+    )
     files = {
         f"{name}.h": printer.header(),
         f"{name}.c": printer.source(),
-        f"{name}_example.c": format_example(name, precision, check.columns(controller)),
+        f"{name}_example.c": format_example(name, precision, check.columns(controller), check.reads_gyro(controller)),
         f"{name}_test_vector.h": vector,
     }
     compiler = find_compiler()
