@@ -202,8 +202,8 @@ def _describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
     }
 
 
-def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
-    """Describe the gyro about the vertical, read every dt [s]: `turn_gyro_type` in C."""
+def describe_mems_gyro(gyro: MemsGyro, dt: float) -> Struct:
+    """Describe the gyro about the vertical, read every dt [s]: `mems_gyro_type` in C."""
     return {
         "stream": NoiseStream.TURN_GYRO,
         "resting": round(gyro.calibration_s / dt),

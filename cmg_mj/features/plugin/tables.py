@@ -26,7 +26,7 @@ from cmg_mj.features.plugin.sensors import (
     Value,
     clock_of,
     describe_axis,
-    describe_turn_gyro,
+    describe_mems_gyro,
     refuse_unsupported,
 )
 from cmg_mj.stages.backlash import Backlash
@@ -131,7 +131,7 @@ def c_text(text: str) -> str:
 NAMES_IN_USE = frozenset(
     """
     axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
-    setup show spin state turn_gyro turning ziggurat
+    setup show spin state mems_gyro turning ziggurat
     """.split()  # noqa: SIM905
 )
 """Names that would clash with the C that all plugins have in common."""
@@ -304,7 +304,7 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     if rig.turning is not None:
         coupling, gyro = rig.turning
         matrices = {name: matrix.tolist() for name, matrix in coupling._asdict().items()}
-        described = {"gyro": describe_turn_gyro(gyro, first.law.dt), **matrices}
+        described = {"gyro": describe_mems_gyro(gyro, first.law.dt), **matrices}
         turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
     fields = {
         "plugin": rig.plugin,

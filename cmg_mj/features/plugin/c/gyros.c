@@ -26,7 +26,7 @@ void fog_sample(
     deliver(&fog->delivery, &places->delivery, memory, instant, &reading);
 }
 
-int turn_gyro_place(int at, turn_gyro_places *places)
+int mems_gyro_place(int at, mems_gyro_places *places)
 {
     places->noise = at;
     places->offset = at + NOISE_WORDS;
@@ -35,7 +35,7 @@ int turn_gyro_place(int at, turn_gyro_places *places)
 }
 
 /* Error of the next sample: white noise, then 1/f noise. */
-static double next_error(const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory)
+static double next_error(const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory)
 {
     double normals[1 + CORNERS], sum = 0.0, *processes = memory + places->wander;
     noise_normals(memory + places->noise, normals, 1 + CORNERS);
@@ -48,7 +48,7 @@ static double next_error(const turn_gyro_type *gyro, const turn_gyro_places *pla
 
 /* Begin, with a mean at rest that is taken off. */
 static void calibrate(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world)
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world)
 {
     double normals[1 + CORNERS], mean = 0.0;
     noise_start(memory + places->noise, seed, world, gyro->stream);
@@ -62,8 +62,8 @@ static void calibrate(
     memory[places->offset] = gyro->bias - mean;
 }
 
-double turn_gyro_read(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world, double rate)
+double mems_gyro_read(
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world, double rate)
 {
     if (!noise_is_started(memory + places->noise)) calibrate(gyro, places, memory, seed, world);
     const double error = next_error(gyro, places, memory) + memory[places->offset];

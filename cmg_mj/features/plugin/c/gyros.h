@@ -24,18 +24,18 @@ typedef struct {
     int piece;   /* of them at a time */
     double sigma, limit, step, scale, bias; /* [rad/s]; scale [1] */
     double flicker_sigma, decay[CORNERS], spread[CORNERS];
-} turn_gyro_type;
+} mems_gyro_type;
 
 typedef struct {
     int noise, offset, wander;
-} turn_gyro_places;
+} mems_gyro_places;
 
 int fog_place(const fog_type *fog, int at, fog_places *places);
 void fog_sample(
     const fog_type *fog, const fog_places *places, double *memory, double seed, double world, double instant, double rate);
 
-int turn_gyro_place(int at, turn_gyro_places *places);
-double turn_gyro_read(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world, double rate);
+int mems_gyro_place(int at, mems_gyro_places *places);
+double mems_gyro_read(
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world, double rate);
 
 #endif

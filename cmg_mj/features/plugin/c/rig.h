@@ -32,7 +32,7 @@ typedef struct {
 
 /* Coupling of the axes in a turn about the vertical: see YawCoupling in cmg_mj/stages/turning.py. */
 typedef struct {
-    turn_gyro_type gyro;
+    mems_gyro_type gyro;
     double flywheels[MOST_AXES][MOST_AXES], inertia[MOST_AXES][MOST_AXES], coriolis[MOST_AXES][MOST_AXES];
 } turning_type;
 

@@ -41,7 +41,7 @@ int turning_place(const turning_type *turning, int at, turning_places *places)
     if (!turning) return at;
     places->rate_from = at++;
     places->rate = at++;
-    return turn_gyro_place(at, &places->gyro);
+    return mems_gyro_place(at, &places->gyro);
 }
 
 int element(double number, int n)
@@ -181,7 +181,7 @@ static void compensate(
     double turned[MOST_AXES], rates[MOST_AXES];
     turning_places own;
     (void)turning_place(turning, at, &own);
-    const double w = turn_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
+    const double w = mems_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
     for (int i = 0; i < n; ++i) {
         turned[i] = sin(results[i].y[1]);
         rates[i] = results[i].rate;

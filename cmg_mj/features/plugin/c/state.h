@@ -48,7 +48,7 @@ enum { ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE, QUANTI
 /* Places of the rig as a whole, behind those of the axes, if its turns are compensated. */
 typedef struct {
     int rate_from, rate; /* place in sensordata, and input, of the rate about the vertical [rad/s] */
-    turn_gyro_places gyro;
+    mems_gyro_places gyro;
 } turning_places;
 
 /* Each returns the first place behind the block. */
