@@ -10,7 +10,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state, needs
+from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state, reads_gyro
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
@@ -122,7 +122,7 @@ class Controller:
         self._single = isinstance(world_ids, int)
         self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         observers = [observer, *self.open_loop_observers.values()]
-        self.reads_gyro = any("gyro" in needs(one) for one in observers)
+        self.reads_gyro = reads_gyro(*observers)
         """True if an observer needs the cheap gyro."""
         self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals

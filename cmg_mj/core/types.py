@@ -111,6 +111,11 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     return getattr(observer, "needs", ("model", "gimbals"))
 
 
+def reads_gyro(*observers: Observer | type) -> bool:
+    """Return whether one of these observers needs the cheap gyro."""
+    return any("gyro" in needs(observer) for observer in observers)
+
+
 def extra_signals(observer: Observer) -> tuple[str, ...]:
     """Return the names of what an observer estimates beyond x, none if it has no `extra_signals`.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shortened
 from cmg_mj.core.sensor import steps_until
-from cmg_mj.core.types import STATE_SIGNALS, extra_signals, needs
+from cmg_mj.core.types import STATE_SIGNALS, extra_signals, reads_gyro
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant
@@ -143,7 +143,7 @@ class ClosedLoop:
             if not true_state:
                 observer, field = design.observer(), f"observer.kind = {design.scenario.observer.kind!r}"
                 self._estimating, extra = observer_slopes(observer), extra_signals(observer)
-                self._reads_gyro = "gyro" in needs(observer)
+                self._reads_gyro = reads_gyro(observer)
                 field = f"controller.kind = {controller.kind!r}"
             self._deciding = law_slopes(design.fresh_law(), len(extra))
         except InputError as error:

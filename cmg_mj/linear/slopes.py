@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.errors import InputError, raised, shortened
-from cmg_mj.core.types import Law, Measurement, Observer, feedback_state, needs
+from cmg_mj.core.types import Law, Measurement, Observer, feedback_state, reads_gyro
 
 STEPS = {1e-8: 1e-3, 1e-7: 1e-2, 1e-3: 0.6}
 """Length of a difference -> the share of a row's largest slope by which the slopes to both sides may be off.
@@ -69,7 +69,7 @@ def observer_slopes(observer: Observer) -> Slopes:
     def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *gyro: float) -> tuple[Any, Any]:
         return observer.step(state, Measurement(y1, y2, acceleration, *gyro), u)
 
-    gyro = (0.0,) if "gyro" in needs(observer) else ()
+    gyro = (0.0,) if reads_gyro(observer) else ()
     return _slopes(observer, step, 4 + len(gyro), Measurement(*REST, *gyro))
 
 

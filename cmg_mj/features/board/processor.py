@@ -12,7 +12,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller, KnownPlant, Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
-from cmg_mj.core.types import Forces, Law, Measurement, Observer, needs
+from cmg_mj.core.types import Forces, Law, Measurement, Observer, reads_gyro
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.simulate import SimulationOptions
@@ -58,7 +58,7 @@ def refuse_gyro(observer: Observer) -> None:
     Raises:
         InputError: The observer needs it.
     """
-    if "gyro" in needs(observer):
+    if reads_gyro(observer):
         raise InputError(f"{type(observer).__name__}: a processor in the loop reads no gyro; take another observer")
 
 

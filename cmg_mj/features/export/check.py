@@ -16,7 +16,7 @@ import numpy as np
 from cmg_mj.core.arrays import clip
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.types import STATE_SIGNALS, needs
+from cmg_mj.core.types import STATE_SIGNALS, reads_gyro
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.compiler import build, run
 from cmg_mj.features.export.constants import Constants
@@ -36,11 +36,6 @@ ROUNDINGS = 4
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 GRAVITY = 9.81
 GYRO_OFFSET = 0.35
-
-
-def reads_gyro(controller: Controller) -> bool:
-    """Return whether the observer in the loop needs the cheap gyro."""
-    return "gyro" in needs(controller.observer)
 
 
 def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
@@ -66,7 +61,7 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
     encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]
     shown = [force + noise * rng.normal(size=TICKS) for force in forces] + encoders
-    if reads_gyro(controller):
+    if reads_gyro(controller.observer):
         shown.append(GYRO_OFFSET + np.gradient(tilt, t) + 0.1 * noise * rng.normal(size=TICKS))
     samples = np.array(shown).T
     samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them

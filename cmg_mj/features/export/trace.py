@@ -9,7 +9,7 @@ import casadi
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state, needs
+from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state, reads_gyro
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
 from cmg_mj.features.export.symbol import (
@@ -65,7 +65,7 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
-        measured = (*MEASURED, GYRO) if "gyro" in needs(observer) else MEASURED
+        measured = (*MEASURED, GYRO) if reads_gyro(observer) else MEASURED
         y, (u,) = symbols_named(measured), symbols_named(["u"])
         first, _, leaves, symbols, after, outputs = _record(
             observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u), measured

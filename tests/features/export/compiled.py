@@ -14,8 +14,8 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import export
-from cmg_mj.features.export.check import reads_gyro
 
 pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
 
@@ -51,7 +51,7 @@ class Compiled:
         files = export(loop, folder, precision=precision)
         self.name = files[0].stem
         self.width = 3 + len(loop.extra_signals[0])
-        self.gyro_at = 4 + len(loop.gimbal_angle.zeros) if reads_gyro(loop) else None
+        self.gyro_at = 4 + len(loop.gimbal_angle.zeros) if reads_gyro(loop.observer) else None
         self.header, self.source, self.example, _ = files
         read_by_every_compiler(self.source, self.example)
         self.library = folder / "export.so"
@@ -112,7 +112,7 @@ class Recording:
 
         def decide_and_record(step: int, forces: Any, encoders: Any, fog: float, rate: float, gyro: float) -> Any:
             tick = decide(step, forces, encoders, fog, rate, gyro)
-            samples.append([*forces, *encoders, *([gyro] if reads_gyro(controller) else [])])
+            samples.append([*forces, *encoders, *([gyro] if reads_gyro(controller.observer) else [])])
             results.append([*tick.estimates[0], tick.u])
             rates.append(rate)
             return tick

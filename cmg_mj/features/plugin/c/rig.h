@@ -24,6 +24,7 @@ typedef struct {
     double raw_rate; /* samples a second inside the accelerometers */
     sensor_settings settings;
     fog_type fog;
+    mems_gyro_type mems_gyro;
     const char *joint;        /* of the tilt; free, or a hinge */
     int dofs;                 /* of it that the tilt rate is made of */
     double shares[MOST_DOFS]; /* of them in it */
