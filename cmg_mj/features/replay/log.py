@@ -127,10 +127,11 @@ class Log:
     Attributes:
         name: Name of the file, without its ending.
         dt: Sample period [s].
-        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Where
+        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `mems_gyro_rad_s`,
+            `reference_rad_s`, each (n,). Where
             the log lacks a signal, y2 and u are zero, the others NaN.
         parts: Slices without a gap; the observers start at the beginning of each.
-        has: Signals of the log among "gimbals" (y2 and u), "acceleration" and "reference".
+        has: Signals of the log among "gimbals" (y2 and u), "acceleration", "gyro" and "reference".
         tilt: Geometry of the two accelerometers, if they measure the tilt.
         windows: Windows that are scored separately [s].
         notes: Changes to the rows that were not requested, and likely mistakes, a line each.
@@ -239,6 +240,7 @@ ROLES: dict[str, Quantity] = {
     "gimbal1": "angle",
     "gimbal2": "angle",
     "command": "rate",
+    "gyro": "rate",
     "rate": "rate",
 }
 """Role -> quantity of its column.
@@ -246,7 +248,8 @@ ROLES: dict[str, Quantity] = {
 `tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
-`gimbal2`, whose half difference it is), `command` their rate, `rate` the reference.
+`gimbal2`, whose half difference it is), `command` their rate, `gyro` a gyro that observers take,
+`rate` the reference.
 """
 
 _ASSIGNMENT = re.compile(
@@ -324,6 +327,10 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         raise InputError("--columns: two accelerometers show the angular acceleration; leave acceleration out")
     if names.keys() & {"gimbal", "gimbal1", "gimbal2"} not in (set(), {"gimbal"}, {"gimbal1", "gimbal2"}):
         raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
+    if "gyro" in names and names["gyro"] == names.get("rate"):
+        raise InputError(
+            f"--columns gyro={names['gyro']}: is the reference too; name another column, or leave rate out"
+        )
     return {role: _column(role, name, options) for role, name in names.items()}
 
 

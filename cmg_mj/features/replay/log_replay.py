@@ -24,7 +24,7 @@ from cmg_mj.observers import OBSERVER_CLASSES, OBSERVERS, Observer, make_observe
 from cmg_mj.observers.parameter_options import Parameters, numbers
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
-from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
+from cmg_mj.results.trajectory import GYRO, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
 from cmg_mj.scenario.loading import parse_scenario
@@ -40,6 +40,7 @@ NEEDS_IN_WORDS = {
     "model": "a model (--model)",
     "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
     "acceleration": "two accelerometers (--columns inner_x=...) or the angular acceleration",
+    "gyro": "a gyro (--columns gyro=...; of a run, run it with --set open_loop_observers='[\"mems_fused\"]')",
 }
 NUMBERS = {
     "inertia": "tilt inertia about the pivot, J1 [kg m^2]",
@@ -220,7 +221,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
 
 
 def _with_noise(log: Log, noise: MeasurementNoise) -> Log:
-    """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
+    """Add noise to the tilt, and to angular acceleration and gyro, if there are any, with the given correlation."""
     random = np.random.default_rng(SEED)
     first, other = random.standard_normal(len(log)), random.standard_normal(len(log))
     second = noise.correlation * first + math.sqrt(1.0 - noise.correlation**2) * other
@@ -228,6 +229,8 @@ def _with_noise(log: Log, noise: MeasurementNoise) -> Log:
         "y1_rad": log["y1_rad"] + noise.tilt * first,
         "acceleration_rad_s2": log["acceleration_rad_s2"] + noise.acceleration * second,
     }
+    if "gyro" in log.has:
+        noisy[GYRO] = log[GYRO] + noise.gyro * math.sqrt(0.5 / log.dt) * random.standard_normal(len(log))
     return replace(log, columns={**log.columns, **noisy})
 
 
