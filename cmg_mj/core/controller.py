@@ -183,10 +183,13 @@ class Controller:
         accelerometers, encoders, fog = self._sampled[:3]
         return accelerometers.read(step), encoders.read(step), fog.read(step)
 
+    def read_gyro(self, step: int) -> Scalar:
+        """Return the cheap gyro's reading at a physics step [rad/s]; NaN if no observer needs it."""
+        return self._sampled[3].read(step) if self.reads_gyro else math.nan
+
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""
-        gyro = self._sampled[3].read(step) if self.reads_gyro else math.nan
-        u = self.decide(step, *self.readings(step), self._true_rate, gyro).u
+        u = self.decide(step, *self.readings(step), self._true_rate, self.read_gyro(step)).u
         if self.turns_gimbals:
             self.command_rate(u)
 

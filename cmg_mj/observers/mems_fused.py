@@ -42,7 +42,7 @@ class MemsFused:
 
     Between samples the rate runs straight. n is the gyro's white noise, v that of y1. The bias walks by w, whose Allan
     deviation meets the gyro's bias instability at 3 s, where IEEE Std 952 reads the walk's coefficient: so b is off by
-    the bias instability after a second. Nothing is tuned. The estimate of the rate is g - b.
+    the bias instability after a second. The estimate of the rate is g - b.
 
     The filter starts at rest at the measured tilt: the first reading is taken for the bias, so that no offset matters.
     y1 tells how far that reading is off.
@@ -52,6 +52,7 @@ class MemsFused:
         model: The reduced model (not used).
         noise: Noise of the tilt and of the gyro, by the sensors' datasheet.
         rate_start: Standard deviation of the rate at the start, about zero [rad/s].
+        walk_factor: Factor on the walk of the bias; 1 is the datasheet's.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("gyro",)
@@ -60,6 +61,7 @@ class MemsFused:
     model: ReducedModel
     noise: MeasurementNoise
     rate_start: Positive = RATE_START
+    walk_factor: Positive = 1.0
 
     def init(self, y: Measurement) -> Any:
         """Start at rest at the measured tilt: what the gyro shows is its bias."""
@@ -69,7 +71,8 @@ class MemsFused:
     def step(self, state: Any, y: Measurement, u: Scalar) -> tuple[Any, Estimate]:
         """Advance by one sample period."""
         x1, b, before, *known = state
-        k1, k2, known = next_gains(known, self._tilt_variance, self.dt, self._white, self.noise.gyro_walk)
+        walk = self.walk_factor * self.noise.gyro_walk
+        k1, k2, known = next_gains(known, self._tilt_variance, self.dt, self._white, walk)
         x1 = x1 + self.dt * (0.5 * (before + y.gyro) - b)
         e = y.y1 - x1
         x1, b = x1 + k1 * e, b + k2 * e

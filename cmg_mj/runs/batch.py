@@ -112,7 +112,7 @@ class BatchedObservers:
 
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
-        self.needs = tuple({need for observer, _ in parts for need in needs(observer)})
+        self.needs = needs(parts[0][0])
         self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
         observers, worlds = zip(*parts, strict=True)
         self._parts = list(zip(map(for_worlds, observers), neighbours(worlds), strict=True))

@@ -36,7 +36,7 @@ STAY: dict[str, dict[str, Unit]] = {
         **dict.fromkeys(("odds_alike", "innovation_weight", "slow_innovation_weight", "gate"), PURE),
         **dict.fromkeys(("pivot_start", "pivot_floor", "rise_factor", "covariance_boost", "inflation"), PURE),
     },
-    "mems_fused": {"rate_start": Unit(-1)},
+    "mems_fused": {"rate_start": Unit(-1), "walk_factor": PURE},
     "super_twisting": {"l0": PURE, "l1": PURE},
     "linear_high_gain": {"a1": PURE, "a2": PURE},
     "high_gain": dict.fromkeys(("l1", "l2", "d_inf", "b", "phi1", "phi3"), PURE),
