@@ -26,6 +26,7 @@ class MeasurementNoise:
         gimbal: Standard deviation of the gimbal angle y2 [rad].
         gyro: Density of the white noise of the cheap gyro [rad/s/sqrt(Hz)].
         gyro_walk: Random walk of that gyro's bias: its standard deviation after a second [rad/s].
+        repeats: Number of control periods that see the same sample of y1.
     """
 
     tilt: float
@@ -34,6 +35,7 @@ class MeasurementNoise:
     gimbal: float = 0.0
     gyro: float = 0.0
     gyro_walk: float = 0.0
+    repeats: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,8 @@ class MemsFused:
 
     @property
     def _tilt_variance(self) -> float:
-        return max(self.noise.tilt, MIN_TILT_SIGMA) ** 2
+        """Variance of y1 at a tick: a sample that counts n times has sqrt(n) times the noise each time [rad^2]."""
+        return max(self.noise.tilt * math.sqrt(self.noise.repeats), MIN_TILT_SIGMA) ** 2
 
 
 def first_covariance(R: Scalar, white: float, rate_start: float) -> Covariance:

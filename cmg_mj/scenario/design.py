@@ -40,7 +40,9 @@ class Design:
     @property
     def constructor_arguments(self) -> tuple[float, ReducedModel, MeasurementNoise]:
         """Arguments of every observer: control period [s], reduced model, noise by the datasheet."""
-        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
+        sensors, dt = self.scenario.sensors, self.law.dt
+        repeats = max(dt, 1.0 / sensors.accelerometer.rate_hz) / dt
+        return dt, self.rig.reduced, replace(self.rig.noise(sensors), repeats=repeats)
 
     def fresh_law(self) -> Law:
         """Make the law of a run."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -272,7 +272,7 @@ def tune(
                 on_share((i + done) / len(densities))
 
         fitted, held_out = (recorded(*half) for half in halves(worlds, [density]))
-        noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
+        noise = replace(experiment.plant.parameters.noise(sensors.with_noise_density(density)), repeats=noise.repeats)
         try:
             levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
             with suppress(StopSearch):
