@@ -15,7 +15,7 @@ from pathlib import Path
 
 OBSERVERS = (
     *("linear", "ltv", "homogeneous", "luenberger", "kalman", "gyro_free", "free_pivot", "finite_difference"),
-    *("super_twisting", "linear_high_gain", "high_gain", "adaptive", "homogeneous_adaptive"),
+    *("super_twisting", "linear_high_gain", "high_gain", "adaptive", "homogeneous_adaptive", "mems_fused"),
 )
 TRIM = {"controller.bias_trim_s": 1.0, "observer.kind": "adaptive"}
 PART = "sensors.accelerometer."

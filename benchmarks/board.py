@@ -202,7 +202,9 @@ def count_for_paper() -> dict[str, float]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--observers", default=",".join(OBSERVERS), metavar="NAMES")
+    parser.add_argument(
+        "--observers", default=",".join(name for name in OBSERVERS if name != "mems_fused"), metavar="NAMES"
+    )
     parser.add_argument("--markdown", action="store_true")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--paper", action="store_true")

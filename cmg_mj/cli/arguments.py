@@ -133,7 +133,7 @@ def observers_option(otherwise: str = "", *, baselines: bool = False) -> Decorat
         return names if baselines else list(dict.fromkeys(check_observer("--observers", name) for name in names))
 
     default = f"  [default: {otherwise}]" if otherwise else ""
-    more = "; baselines: zero, mems_as_bought, mems_gyro, mems_fused" if baselines else ""
+    more = "; baselines: zero, mems_as_bought, mems_gyro" if baselines else ""
     return click.option(
         "--observers",
         default=None if otherwise else "all",

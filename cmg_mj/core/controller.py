@@ -10,7 +10,7 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state
+from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state, reads_gyro
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
@@ -30,6 +30,8 @@ class Tick(NamedTuple):
     x_e: Scalar
     estimates: Sequence[Sequence[Scalar]]
     """The observer's estimate (x1, x2, x3, its extra signals), then those of the open-loop observers."""
+    gyro: Scalar = math.nan
+    """Reading of the cheap gyro, if an observer needs it [rad/s]."""
 
 
 CommandStage = Callable[[Scalar], Scalar]
@@ -120,6 +122,8 @@ class Controller:
         self._single = isinstance(world_ids, int)
         self.period = whole_steps(law.dt, self.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz")
         observers = [observer, *self.open_loop_observers.values()]
+        self.reads_gyro = reads_gyro(*observers)
+        """True if an observer needs the cheap gyro."""
         self._observers = ObserverRunner(observers, self._single)
         self.extra_signals = self._observers.extra_signals
         self._law = LawRunner(law, self._single)
@@ -132,7 +136,8 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
-        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.world_ids, self.axis)
+        gyro = {"gyro_period_s": self.law.dt} if self.reads_gyro else {}
+        self._sampled = self.sensors.at_work(self.timestep, self.seed, self.world_ids, self.axis, **gyro)
         self.tick: Tick | None = None
         self.gimbal_rate: Scalar = None
         """The rate at which the gimbals are turned since the last tick: its u, behind the servo's stages [rad/s]."""
@@ -175,12 +180,16 @@ class Controller:
 
     def readings(self, step: int) -> tuple[Forces, Sequence[Scalar], Scalar]:
         """Return the samples that have been delivered by a physics step, as `decide` takes them."""
-        accelerometers, encoders, fog = self._sampled
+        accelerometers, encoders, fog = self._sampled[:3]
         return accelerometers.read(step), encoders.read(step), fog.read(step)
+
+    def read_gyro(self, step: int) -> Scalar:
+        """Return the cheap gyro's reading at a physics step [rad/s]; NaN if no observer needs it."""
+        return self._sampled[3].read(step) if self.reads_gyro else math.nan
 
     def control(self, step: int) -> None:
         """Take the control decision of a tick, a multiple of `period`: see `update`."""
-        u = self.decide(step, *self.readings(step), self._true_rate).u
+        u = self.decide(step, *self.readings(step), self._true_rate, self.read_gyro(step)).u
         if self.turns_gimbals:
             self.command_rate(u)
 
@@ -190,7 +199,15 @@ class Controller:
             u = stage(u)
         self.gimbal_rate = u
 
-    def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
+    def decide(
+        self,
+        step: int,
+        forces: Forces,
+        encoders: Sequence[Scalar],
+        fog: Scalar,
+        rate: Scalar,
+        gyro: Scalar = math.nan,
+    ) -> Tick:
         """Take the control decision of a tick from the samples that have been delivered.
 
         Args:
@@ -199,6 +216,7 @@ class Controller:
             encoders: Gimbal angles, one a gimbal [rad].
             fog: The gyro's rate [rad/s].
             rate: The true one, where that is fed back [rad/s].
+            gyro: Reading of the cheap gyro, where an observer needs it [rad/s].
 
         Returns:
             The tick, which counts as the last one from now on.
@@ -212,6 +230,8 @@ class Controller:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))
         y.acceleration = acceleration
+        if self.reads_gyro:
+            y.gyro = gyro
         time = step * self.timestep
         if self.tick is None:
             estimates, held = self._observers.start(y, time), 0.0 * y1
@@ -228,5 +248,5 @@ class Controller:
         u, x_e = self._law.decide(y, feedback_state(x1, x2, x3, estimate[3:]), held, time)
         for stage in self.command_stages:
             u = stage(u)
-        self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates))
+        self.tick = _new(Tick, (y1, y2, acceleration, fog, u, x_e, estimates, gyro))
         return self.tick

@@ -24,12 +24,18 @@ class MeasurementNoise:
         acceleration: Standard deviation of the angular acceleration [rad/s^2].
         correlation: Of both, which come from the same two readings.
         gimbal: Standard deviation of the gimbal angle y2 [rad].
+        gyro: Density of the white noise of the cheap gyro [rad/s/sqrt(Hz)].
+        gyro_walk: Random walk of that gyro's bias: its standard deviation after a second [rad/s].
+        repeats: Number of control periods that see the same sample of y1.
     """
 
     tilt: float
     acceleration: float
     correlation: float
     gimbal: float = 0.0
+    gyro: float = 0.0
+    gyro_walk: float = 0.0
+    repeats: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,22 @@ _new = tuple.__new__
 class Measurement(_Angles):
     """y of aranovskiy2020 (5), two angles: floats for one world, arrays (n_worlds,) for many.
 
-    Beside them, `acceleration` is what the same two accelerometers say of the tilt's angular acceleration [rad/s^2]; it
-    is no part of the papers' y, so that `y1, y2 = y` takes the angles alone. NaN where it is not measured.
+    Beside them, `acceleration` is what the same two accelerometers say of the tilt's angular acceleration [rad/s^2],
+    and `gyro` the reading of a cheap gyro [rad/s]. Both are no part of the papers' y, so that `y1, y2 = y` takes the
+    angles alone. NaN where they are not measured.
     """
 
     acceleration: Scalar = math.nan
+    gyro: Scalar = math.nan
 
-    def __new__(cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan) -> Measurement:
-        """Make a measurement of the angles [rad], and of the angular acceleration if it is measured [rad/s^2]."""
+    def __new__(
+        cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan, gyro: Scalar | None = None
+    ) -> Measurement:
+        """Make a measurement of the angles [rad]; angular acceleration [rad/s^2] and rate [rad/s] if measured."""
         y = _new(cls, (y1, y2))
         y.acceleration = acceleration
+        if gyro is not None:
+            y.gyro = gyro
         return y
 
 
@@ -85,8 +91,8 @@ class Observer(Protocol):
         ...
 
 
-NEEDS = ("model", "gimbals", "acceleration")
-"""Inputs that an observer may need beside y1: the reduced model, y2 and u, the angular acceleration."""
+NEEDS = ("model", "gimbals", "acceleration", "gyro")
+"""Inputs that an observer may need beside y1: the reduced model, y2 and u, the angular acceleration, a cheap gyro."""
 
 BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
@@ -103,6 +109,11 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
     """
     return getattr(observer, "needs", ("model", "gimbals"))
+
+
+def reads_gyro(*observers: Observer | type) -> bool:
+    """Return whether one of these observers needs the cheap gyro."""
+    return any("gyro" in needs(observer) for observer in observers)
 
 
 def extra_signals(observer: Observer) -> tuple[str, ...]:

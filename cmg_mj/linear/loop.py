@@ -12,7 +12,7 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shortened
 from cmg_mj.core.sensor import steps_until
-from cmg_mj.core.types import STATE_SIGNALS, extra_signals
+from cmg_mj.core.types import STATE_SIGNALS, extra_signals, reads_gyro
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
 from cmg_mj.plant.plant import Plant
@@ -31,14 +31,14 @@ INPUTS = (
     "fog_noise_rad_s",
     "gimbal_rate_noise_rad_s",
 )
-"""Inputs of the system: a torque on the rig, noise of the four measurements, a gimbal rate that nobody commanded."""
+"""Inputs of the system: a torque on the rig, noise of four measurements, a gimbal rate that nobody commanded."""
 OUTPUTS = (*STATE_SIGNALS, "u_rad_s")
 """Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
 TAKES = (
     *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain"),
-    *("kalman", "linear", "linear_high_gain", "ltv", "luenberger"),
+    *("kalman", "linear", "linear_high_gain", "ltv", "luenberger", "mems_fused"),
 )
 """The package's observers that have a slope at rest."""
 NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
@@ -143,6 +143,7 @@ class ClosedLoop:
             if not true_state:
                 observer, field = design.observer(), f"observer.kind = {design.scenario.observer.kind!r}"
                 self._estimating, extra = observer_slopes(observer), extra_signals(observer)
+                self._reads_gyro = reads_gyro(observer)
                 field = f"controller.kind = {controller.kind!r}"
             self._deciding = law_slopes(design.fresh_law(), len(extra))
         except InputError as error:
@@ -257,7 +258,10 @@ class ClosedLoop:
             y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
             y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
             measured = [y1, y2, acceleration, before]
-            estimate = self._advance("observer", self._estimating, measured)
+            shown = (
+                [(1.0 + self._design.scenario.sensors.mems_gyro.scale_error) * motion[5]] if self._reads_gyro else []
+            )
+            estimate = self._advance("observer", self._estimating, [*measured, *shown])
         x1, x2, x3 = (measured[0], estimate[1], y2) if settings.angle_source == "measured" else estimate[:3]
         if settings.feedback != "observer":
             x2 = motion[1] if settings.feedback == "truth" else readings["fog"] + rows["fog_noise_rad_s"]

@@ -127,4 +127,6 @@ def _quiet(sensors: Sensors) -> Sensors:
     pair = Accelerometer(**times, noise_density_ug_rthz=0.0, counts_per_g=0.0)
     encoder = replace(sensors.encoder, counts_per_revolution=0.0)
     fog = replace(sensors.fog, angle_random_walk_deg_rth=0.0, bias_deg_h=0.0)
-    return replace(sensors, accelerometer=pair, encoder=encoder, fog=fog)
+    silent = ("noise_density_deg_s_rthz", "bias_instability_deg_h", "scale_error", "bias_deg_s", "counts_per_deg_s")
+    gyro = replace(sensors.mems_gyro, reading="calibrated", **dict.fromkeys(silent, 0.0))
+    return replace(sensors, accelerometer=pair, encoder=encoder, fog=fog, mems_gyro=gyro)

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.errors import InputError, raised, shortened
-from cmg_mj.core.types import Law, Measurement, Observer, feedback_state
+from cmg_mj.core.types import Law, Measurement, Observer, feedback_state, reads_gyro
 
 STEPS = {1e-8: 1e-3, 1e-7: 1e-2, 1e-3: 0.6}
 """Length of a difference -> the share of a row's largest slope by which the slopes to both sides may be off.
@@ -24,6 +24,8 @@ RESTED = 1e-9
 """A number rests that changes by less than this share in a sample."""
 GONE = 1e-15
 """Or by less than this share of the largest that it was: a trace of the start that fades for ever."""
+REST = (0.0, 0.0, 0.0)
+"""Measurement at rest: y1, y2, acceleration."""
 MAX_SAMPLES = 40_000
 """Samples after which a state that has not come to rest is given up."""
 LOOK_EVERY = 100
@@ -52,20 +54,23 @@ class Slopes(NamedTuple):
 
 
 def observer_slopes(observer: Observer) -> Slopes:
-    """Find the slopes of an observer. Inputs: y1, y2, acceleration, u. Outputs: its estimate.
+    """Find the slopes of an observer. Inputs: y1, y2, acceleration, u; the gyro if needed. Outputs: its estimate.
 
     Args:
         observer: The observer.
 
     Returns:
-        The slopes at rest, y1 = y2 = u = 0.
+        The slopes at rest, where all inputs are 0.
 
     Raises:
         InputError: The observer does not come to rest, has no slope there, or fails.
     """
-    return _slopes(
-        observer, lambda state, y1, y2, acceleration, u: observer.step(state, Measurement(y1, y2, acceleration), u), 4
-    )
+
+    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *gyro: float) -> tuple[Any, Any]:
+        return observer.step(state, Measurement(y1, y2, acceleration, *gyro), u)
+
+    gyro = (0.0,) if reads_gyro(observer) else ()
+    return _slopes(observer, step, 4 + len(gyro), Measurement(*REST, *gyro))
 
 
 def law_slopes(law: Law, extra_signals: int) -> Slopes:
@@ -88,7 +93,7 @@ def law_slopes(law: Law, extra_signals: int) -> Slopes:
         state, command = law.step(state, Measurement(y1, y2, acceleration), x, u)
         return state, (command,)
 
-    return _slopes(law, step, 7 + extra_signals)
+    return _slopes(law, step, 7 + extra_signals, Measurement(*REST))
 
 
 def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -107,11 +112,11 @@ def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
     return needed
 
 
-def _slopes(part: Observer | Law, step: Step, inputs: int) -> Slopes:
-    """Find the slopes of a step at rest, without the states that no output depends on."""
+def _slopes(part: Observer | Law, step: Step, inputs: int, y: Measurement) -> Slopes:
+    """Find the slopes of a step at rest, from this measurement on, without the states that no output depends on."""
     with np.errstate(all="ignore"):
         try:
-            rest = _rest(part.init(Measurement(0.0, 0.0, 0.0)), step, inputs)
+            rest = _rest(part.init(y), step, inputs)
             names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
             sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
         except InputError:

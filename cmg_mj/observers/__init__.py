@@ -21,6 +21,7 @@ OBSERVERS = {
     "kalman": "cmg_mj.observers.kalman:Kalman",
     "gyro_free": "cmg_mj.observers.gyro_free:GyroFree",
     "free_pivot": "cmg_mj.observers.free_pivot:FreePivot",
+    "mems_fused": "cmg_mj.observers.mems_fused:MemsFused",
     "finite_difference": "cmg_mj.observers.linear:FiniteDifference",
     "super_twisting": "cmg_mj.observers.linear:SuperTwisting",
     "linear_high_gain": "cmg_mj.observers.linear:LinearHighGain",

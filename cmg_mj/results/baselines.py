@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.noise import normals
+from cmg_mj.observers.mems_fused import MIN_TILT_SIGMA, RATE_START, Covariance, first_covariance, next_gains
 from cmg_mj.results.floors import FLOORS
 from cmg_mj.sensors.gyros import MemsGyro
 
@@ -17,26 +18,17 @@ GYROS = (MEMS_AS_BOUGHT, MEMS_GYRO, MEMS_FUSED)
 """The cheap gyro as it is bought, calibrated, and as bought but fused with y1."""
 RATES = (ZERO, *GYROS)
 """Baselines that give a rate at every tick."""
+NO_OBSERVERS = (ZERO, MEMS_AS_BOUGHT, MEMS_GYRO)
+"""Those of them that are no observers: they close no loop."""
 BASELINES = (*RATES, *FLOORS)
 """Names of all baselines, in the order of every table."""
 
-RATE_START = 0.02
-"""Standard deviation of the rate at the start, about zero: that of `gyro_free` [rad/s]."""
-MIN_TILT_SIGMA = 1e-6
-"""A y1 without any noise counts with this one, as for the law `lqg` [rad]."""
 SETTLED = 1e-13
 """Gains that change by less from tick to tick, relative, are taken to be constant."""
 
 
 class FusedGyro:
-    """x1' = g - b - n, b' = w, y1 = x1 + v at the samples, where g is the gyro's reading.
-
-    Between samples the rate runs straight. n is the gyro's white noise, v that of y1. The bias walks by w, whose Allan
-    deviation meets the gyro's bias instability at 3 s, where IEEE Std 952 reads the walk's coefficient: so b is off by
-    the bias instability after a second. Nothing is tuned. The estimate of the rate is g - b.
-
-    Like every observer it starts at rest at the measured tilt: the first reading is taken for the bias, so that no
-    offset matters. y1 tells how far that is off.
+    """The observer `mems_fused` open loop, for many ticks at once: every run has it, and a step a tick takes longer.
 
     Args:
         gyro_sigma: Standard deviation of a sample of the gyro [rad/s].
@@ -60,10 +52,8 @@ class FusedGyro:
         sigmas = np.maximum(tilt_sigmas, MIN_TILT_SIGMA)
         alike = bool((sigmas == sigmas[0]).all())
         self._R: Scalar = float(sigmas[0]) ** 2 if alike else sigmas * sigmas
-        self._tilt_noise, self._walk = (gyro_sigma * dt) ** 2, bias_instability**2 * dt
-        zero = 0.0 * self._R
-        self.covariance: tuple[Scalar, Scalar, Scalar] = self._R, zero, rate_start**2 + gyro_sigma**2 + zero
-        """Covariance of the errors of x1 and b after the last sample: of x1, of both, of b."""
+        self._gyro_sigma, self._walk = gyro_sigma, bias_instability
+        self.covariance: Covariance = first_covariance(self._R, gyro_sigma, rate_start)
         self._gains: list[tuple[Scalar, Scalar]] = []
         self._is_settled = False
         self._turned = self._reading = self._x1 = self._turn = np.zeros(len(sigmas))
@@ -117,16 +107,10 @@ class FusedGyro:
         if self._is_settled:
             return self._gains[-1:] * n
         gains: list[tuple[Scalar, Scalar]] = [] if self._gains else [(1.0, 0.0)]
-        dt, R, tilt_noise, walk = self._dt, self._R, self._tilt_noise, self._walk
-        xx, xb, bb = self.covariance
         for _ in range(n - len(gains)):
-            xx = xx + dt * (dt * bb - 2.0 * xb) + tilt_noise
-            xb = xb - dt * bb
-            bb = bb + walk
-            k1, k2 = xx / (xx + R), xb / (xx + R)
-            xx, xb, bb = R * k1, R * k2, bb - k2 * xb
-            gains.append((k1, dt * k2))
-        self.covariance, self._gains = (xx, xb, bb), gains
+            k1, k2, self.covariance = next_gains(self.covariance, self._R, self._dt, self._gyro_sigma, self._walk)
+            gains.append((k1, self._dt * k2))
+        self._gains = gains
         if n > 1:
             changes = [abs(b - a) <= SETTLED * abs(b) for a, b in zip(gains[-2], gains[-1], strict=True)]
             self._is_settled = bool(np.all(changes[0]) and np.all(changes[1]))
@@ -154,9 +138,8 @@ class Baselines:
         tilt_sigmas: Sequence[float],
         axis: int = 0,
     ) -> None:
-        noise = normals(seed, world_ids, NoiseStream.MEMS_GYRO.on_axis(axis), gyro.channels)
-        part = np.array(next(normals(seed, world_ids, NoiseStream.MEMS_PART.on_axis(axis), 2))).reshape(2, -1)
-        self._read = gyro.make_both(dt, noise, part)
+        self._read = gyro.started(dt, lambda stream, channels: normals(seed, world_ids, stream.on_axis(axis), channels))
+        self._is_calibrated = gyro.reading == "calibrated"
         self._fused = FusedGyro(gyro.white_noise_sigma(dt), gyro.flicker_floor, tilt_sigmas, dt)
 
     def rates(self, body_rate: np.ndarray, y1: np.ndarray) -> dict[str, np.ndarray]:
@@ -170,5 +153,5 @@ class Baselines:
             Name -> rate, (n_rows, n_worlds) [rad/s].
         """
         calibrated, as_bought = self._read(body_rate)
-        fused = self._fused.rates(as_bought, y1)
+        fused = self._fused.rates(calibrated if self._is_calibrated else as_bought, y1)
         return {ZERO: np.zeros_like(body_rate), MEMS_AS_BOUGHT: as_bought, MEMS_GYRO: calibrated, MEMS_FUSED: fused}

@@ -31,6 +31,9 @@ SIGNALS = (
 )
 """Columns of every trajectory after `time_s`: true state, measurements, gyro, command, integrator [rad s], push."""
 
+GYRO = "mems_gyro_rad_s"
+"""Column of the cheap gyro's reading, where an observer needs it."""
+
 POSITIONS = {
     "hinge": ("angle/{}_rad",),
     "slide": ("position/{}_m",),
@@ -56,6 +59,7 @@ class Layout:
         extra_signals: For each observer the names of the signals that it estimates beyond x.
         joints: In the order of qpos; a hinge has the columns `angle/<joint>_rad` and `rate/<joint>_rad_s`.
         kinds: `hinge`, `slide`, `ball` or `free` for each joint (see `POSITIONS` and `RATES`); none if all are hinges.
+        gyro: True if the cheap gyro was read: column `mems_gyro_rad_s`.
         axes: For a plant of several axes a layout each, without joints: the columns of an axis begin with `<axis>/`.
         name: The axis' name.
     """
@@ -64,6 +68,7 @@ class Layout:
     extra_signals: tuple[tuple[str, ...], ...]
     joints: tuple[str, ...]
     kinds: tuple[str, ...] = ()
+    gyro: bool = False
     axes: tuple[Layout, ...] = ()
     name: str = ""
 
@@ -93,7 +98,7 @@ class Layout:
             for observer, more in zip(self.observers, self.extra_signals, strict=True)
             for name in (*STATE_SIGNALS, *more)
         ]
-        return [*SIGNALS, *estimates]
+        return [*SIGNALS, *([GYRO] if self.gyro else []), *estimates]
 
 
 def frame_of(table: pa.Table) -> pd.DataFrame:

@@ -15,7 +15,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.one_by_one import for_worlds
-from cmg_mj.core.types import State, extra_signals
+from cmg_mj.core.types import State, extra_signals, needs
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
@@ -112,6 +112,7 @@ class BatchedObservers:
 
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
+        self.needs = needs(parts[0][0])
         self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
         observers, worlds = zip(*parts, strict=True)
         self._parts = list(zip(map(for_worlds, observers), neighbours(worlds), strict=True))
@@ -133,7 +134,8 @@ class BatchedObservers:
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:
     """Take the measurement of some of the worlds."""
-    return Measurement(y.y1[worlds], y.y2[worlds], y.acceleration[worlds])  # type: ignore[index]
+    gyro = y.gyro[worlds] if np.ndim(y.gyro) else None  # type: ignore[index]
+    return Measurement(y.y1[worlds], y.y2[worlds], y.acceleration[worlds], gyro)  # type: ignore[index]
 
 
 def batched_open_loop_observers(designs: Sequence[Design]) -> dict[str, Observer]:

@@ -215,7 +215,8 @@ def comparison_rows(compared: Sequence[ComparedObserver]) -> list[ComparisonRow]
     """
     leader = best_observer(compared, PUSH_ERROR) or best_observer(compared, ERROR)
     known = section(leader.result.summaries[0], "references") if leader else {}
-    references = [ComparisonRow(leader, name) for name in BASELINES if name in known] if leader else []
+    names = [name for name in BASELINES if name in known and name not in {entry.kind for entry in compared}]
+    references = [ComparisonRow(leader, name) for name in names] if leader else []
     return [*map(ComparisonRow, compared), *references]
 
 

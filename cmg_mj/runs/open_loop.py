@@ -10,11 +10,11 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.one_by_one import for_worlds
 from cmg_mj.core.types import STATE_SIGNALS, extra_signals
 from cmg_mj.observers import Estimate, Measurement, Observer
-from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.trajectory import GYRO, Trajectory
 
 
 def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
-    """Replay an observer on recorded measurements: y1, y2, angular acceleration (if recorded) and command u.
+    """Replay an observer on recorded measurements: y1, y2, command u and, if recorded, angular acceleration and gyro.
 
     The observer runs open loop, whatever the loop was closed on. From the first row on, its estimates are bitwise
     those of an open-loop observer in the same run.
@@ -34,9 +34,10 @@ def replay(observer: Observer, trajectory: Trajectory) -> Estimate:
 def replay_all(observer: Observer, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Replay as `replay` does; return x and the observer's other estimates (zero at the first row) by name."""
     y1 = trajectory["y1_rad"]
-    measured = trajectory.columns.get("acceleration_rad_s2")
-    acceleration = np.full_like(y1, np.nan) if measured is None else measured
-    measurements = map(Measurement, *map(_rows, (y1, trajectory["y2_rad"], acceleration)))
+    acceleration, gyro = (
+        trajectory.columns.get(name, np.full_like(y1, np.nan)) for name in ("acceleration_rad_s2", GYRO)
+    )
+    measurements = map(Measurement, *map(_rows, (y1, trajectory["y2_rad"], acceleration, gyro)))
     first = next(measurements)
     columns = {name: np.empty(y1.shape) for name in (*STATE_SIGNALS, *extra_signals(observer))}
     for column in columns.values():

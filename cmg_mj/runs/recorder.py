@@ -51,7 +51,9 @@ class TickRecorder:
         self._axis, self._controller = plants[0].axis, controller
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
-        self._layout = Layout(tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds)
+        self._layout = Layout(
+            tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds, controller.reads_gyro
+        )
         dt, sensors = controller.law.dt, controller.sensors
         self._keep, self._joints, self._dt = keep, joints, dt
         self._single = isinstance(controller.world_ids, int)
@@ -66,6 +68,7 @@ class TickRecorder:
             slides = plant.radial_tilt.height != plant.reduced.pivot_arm
             other = unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends or slides
             acceleration_floors.append(None if other else acceleration_floor(noise, y1_period))
+        rates = [name for name in RATES if name not in observers]  # an observer is its own baseline
         self.metrics = Metrics(
             observers,
             len(plants),
@@ -74,7 +77,7 @@ class TickRecorder:
             controller.law.rate_limit,
             settings,
             [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs],
-            RATES,
+            rates,
             TiltFloor(y1_period, len(plants)),
             acceleration_floors,
         )
@@ -106,7 +109,8 @@ class TickRecorder:
             return
         columns, body_rate = self._piece()
         self._waiting = []
-        self.metrics.update(columns, self._references.rates(body_rate, columns["y1_rad"]))
+        rates = self._references.rates(body_rate, columns["y1_rad"])
+        self.metrics.update(columns, {name: rates[name] for name in self.metrics.references})
         if self._keep:
             for name, column in columns.items():
                 self._kept[name].append(column)
@@ -115,14 +119,15 @@ class TickRecorder:
         """Make the waiting ticks into columns by name, NaN after a world's end, and the frame's rate."""
         qs, vs, ticks, body_rates, torques, runnings = zip(*self._waiting, strict=True)
         q, v = self._columns(qs), self._columns(vs)
-        *measured, estimates = zip(*ticks, strict=True)
+        *measured, estimates, gyro = zip(*ticks, strict=True)
         measured = self._columns(list(zip(*measured, strict=True)))
         shape = measured[0].shape
         push = np.broadcast_to(self._columns([(torque,) for torque in torques])[0], shape)
         estimated = chain.from_iterable(self._columns(estimate) for estimate in zip(*estimates, strict=True))
         line = self._axis.line
         true = line.lean(q) + self._bias, line.rate(v), self._axis.gimbal_angle(q)
-        signals = [*true, *measured, push, *estimated, *([*q, *v] if self._joints else [])]
+        readings = [np.array(gyro).reshape(shape)] if self._controller.reads_gyro else []
+        signals = [*true, *measured, push, *readings, *estimated, *([*q, *v] if self._joints else [])]
         if not self._single:
             ended = ~np.array(runnings)
             signals = [np.where(ended, np.nan, signal) for signal in signals]

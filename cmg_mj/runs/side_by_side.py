@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterator, Sequence
 from itertools import groupby
 from typing import NamedTuple, Unpack
 
-from cmg_mj.core.types import extra_signals
+from cmg_mj.core.types import extra_signals, reads_gyro
 from cmg_mj.results.result import Result
 from cmg_mj.runs.batch import BatchedObservers, neighbours
 from cmg_mj.runs.experiment import Experiment, run_batch
@@ -78,7 +78,9 @@ def _shared_key(job: BatchJob) -> Hashable:
     if first.several or len({one.batch_key for one in job.experiments}) > 1:
         return None
     key = tuple(part for part in first.batch_key if not part[1])
-    return key, extra_signals(first.design.observer()), tuple(first.scenario.open_loop_names())
+    observer = first.design.observer()
+    gyro = first.scenario.observer.kind if reads_gyro(observer) else None  # columns and baselines differ
+    return key, extra_signals(observer), gyro, tuple(first.scenario.open_loop_names())
 
 
 def _run_together(jobs: Sequence[BatchJob], options: SimulationOptions) -> list[Result]:

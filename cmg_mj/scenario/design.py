@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,7 +40,9 @@ class Design:
     @property
     def constructor_arguments(self) -> tuple[float, ReducedModel, MeasurementNoise]:
         """Arguments of every observer: control period [s], reduced model, noise by the datasheet."""
-        return self.law.dt, self.rig.reduced, self.rig.noise(self.scenario.sensors)
+        sensors, dt = self.scenario.sensors, self.law.dt
+        repeats = max(dt, 1.0 / sensors.accelerometer.rate_hz) / dt
+        return dt, self.rig.reduced, replace(self.rig.noise(sensors), repeats=repeats)
 
     def fresh_law(self) -> Law:
         """Make the law of a run."""
@@ -174,13 +177,19 @@ class PlantNumbers(NamedTuple):
     hints: tuple[str, ...]
 
     def noise(self, sensors: Sensors) -> MeasurementNoise:
-        """Return the noise of tilt, angular acceleration and y2.
+        """Return the noise of tilt, angular acceleration, y2 and the cheap gyro.
 
         The gimbals of an axis mirror each other about upright, so their encoders round alike and y2 has the noise of
         one. Only while the plant turns about the vertical do the gimbals differ, and their mean has less.
         """
         noise = self.tilt.noise(sensors.accelerometer.sample_sigma, self.gravity)
-        return replace(noise, gimbal=sensors.encoder.sample_sigma)
+        gyro = sensors.mems_gyro
+        return replace(
+            noise,
+            gimbal=sensors.encoder.sample_sigma,
+            gyro=math.radians(gyro.noise_density_deg_s_rthz),
+            gyro_walk=gyro.flicker_floor,
+        )
 
 
 class StageOptions(TypedDict, total=False):

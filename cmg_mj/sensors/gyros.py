@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from itertools import chain, islice
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -37,6 +37,7 @@ class MemsGyro:
     rest, just before a run at constant temperature.
 
     Attributes:
+        reading: What an observer reads that needs the gyro: the gyro `as_bought`, or `calibrated`.
         noise_density_deg_s_rthz: One-sided density of the white noise; one sample's sigma is density * sqrt(rate/2).
         bias_instability_deg_h: Bias instability: the floor of the Allan deviation, made by 1/f noise [deg/h].
         scale_error: Relative scale error of the reading.
@@ -49,6 +50,7 @@ class MemsGyro:
         counts_per_deg_s: Resolution; 0 for readings that are not rounded.
     """
 
+    reading: Literal["as_bought", "calibrated"] = "as_bought"
     noise_density_deg_s_rthz: NonNegative = 0.005
     bias_instability_deg_h: NonNegative = 82.0
     scale_error: Annotated[float, Field(gt=-1.0, lt=1.0)] = 0.03
@@ -122,6 +124,24 @@ class MemsGyro:
             return self._shown(rate, common + calibrated), self._shown(rate, as_bought)
 
         return read
+
+    def started(
+        self, dt: float, noise: Callable[[NoiseStream, int], Iterator]
+    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Make the gyro of a run at work twice, as `make_both` does, from the noise of a stream."""
+        part = np.array(next(noise(NoiseStream.MEMS_PART, 2))).reshape(2, -1)
+        return self.make_both(dt, noise(NoiseStream.MEMS_GYRO, self.channels), part)
+
+    def at_work(self, site: Site, dt: float) -> SampledSensor:
+        """Start the gyro that observers read, every dt [s]: as bought or calibrated."""
+        read, is_calibrated = self.started(dt, site.noise), self.reading == "calibrated"
+
+        def show(rate: Scalar, ideal: IdealReading) -> Scalar:
+            calibrated, as_bought = read(np.atleast_2d(rate))
+            shown = (calibrated if is_calibrated else as_bought)[0]
+            return shown if np.ndim(rate) else shown.item()
+
+        return SampledSensor(1.0 / dt, 0.0, site, "gyro", [show])
 
     def _shown(self, rate: np.ndarray, errors: np.ndarray) -> np.ndarray:
         """Read a true rate with these errors of the zero, (n_rows, n_worlds) [rad/s]."""

@@ -30,7 +30,7 @@ from cmg_mj.results.result import Result
 from cmg_mj.results.tables import markdown_table
 
 ERROR, PUSH_ERROR = "velocity_rms_error_rad_s", "velocity_rms_error_push_rad_s"
-WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration"}
+WORDS = {"model": "model", "gimbals": "y2, u", "acceleration": "acceleration", "gyro": "a gyro"}
 LOOP_OF_BASELINES = "gyro_free"
 HEADINGS = (
     "observer",
@@ -74,6 +74,8 @@ def tolerated(limit: np.ndarray) -> str:
 
 def instructions(observer: str) -> str:
     """Return the instructions of a whole update on the board, or a dash."""
+    if observer == MEMS_FUSED:
+        return "-"
     measure = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "board.py"))["measure"]
     try:
         (figures,) = measure([observer])["figures"]
@@ -114,8 +116,9 @@ def main() -> None:
     rows += [
         [f"`{name}`", *errors(loop, name), means(gentle, name), "-", "-", "-", asked.get(name, "-")]
         for name in BASELINES
+        if name not in names
     ]
-    print(f"{worlds} worlds; the last {len(BASELINES)} rows are open loop, in the loop of {LOOP_OF_BASELINES}\n")
+    print(f"{worlds} worlds; baselines are open loop, in the loop of {LOOP_OF_BASELINES}\n")
     print(markdown_table(list(HEADINGS), rows))
 
 

@@ -84,7 +84,7 @@ def _beside(pattern: str, on_host: np.ndarray, on_board: np.ndarray) -> list[str
 def main() -> None:
     """Print the table, a row an observer as they come."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--observers", default=",".join(OBSERVERS))
+    parser.add_argument("--observers", default=",".join(name for name in OBSERVERS if name != "mems_fused"))
     parser.add_argument("--worlds", type=int, default=20)
     parser.add_argument("--scenario", default="push_recovery")
     of = parser.parse_args()

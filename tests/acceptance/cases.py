@@ -23,6 +23,7 @@ STANDING = {
     "kalman": (),
     "high_gain": (),
     "homogeneous_adaptive": (),
+    "mems_fused": (),
     "luenberger": ("plant.equilibrium_bias_deg=0.1",),
     "finite_difference": ("sensors.accelerometer.noise_density_ug_rthz=100.0",),
     "super_twisting": ("observer.L=15.0",),

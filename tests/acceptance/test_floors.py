@@ -53,7 +53,9 @@ def test_gyro_free_is_at_its_floor(key: str, limit: float) -> None:
 @pytest.mark.slow
 def test_gyro_free_is_several_times_nearer_than_the_best_of_y1_y2_and_u() -> None:
     for key, most in ((ERROR, 0.35), (PUSH_ERROR, 0.18)):
-        others = [name for name in OBSERVERS if name not in ("gyro_free", "free_pivot", "kalman", "luenberger")]
+        others = [
+            name for name in OBSERVERS if name not in ("gyro_free", "free_pivot", "mems_fused", "kalman", "luenberger")
+        ]
         best = min(others, key=lambda name, key=key: np.nan_to_num(loop(name, key), nan=np.inf).mean())
         assert upper_end(loop("gyro_free", key), loop(best, key)) < most, best
 

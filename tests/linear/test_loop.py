@@ -28,6 +28,12 @@ DT = 0.005
 QUIET = {
     "accelerometer": {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0},
     "encoder": {"counts_per_revolution": 0.0},
+    "mems_gyro": {
+        "noise_density_deg_s_rthz": 1e-6,
+        "bias_instability_deg_h": 0.01,
+        "counts_per_deg_s": 0.0,
+        "warming_k_min": 0.0,
+    },
 }
 
 
@@ -123,7 +129,7 @@ def test_the_run_of_a_small_push_is_that_of_the_linear_system() -> None:
 
 
 AT_REST = dict.fromkeys(("linear", "luenberger", "ltv", "linear_high_gain", "finite_difference"), 1.2e-3)
-SETTLING = dict.fromkeys(("kalman", "gyro_free", "free_pivot"), 0.03)
+SETTLING = dict.fromkeys(("kalman", "gyro_free", "free_pivot", "mems_fused"), 0.03)
 """At the push, half a second after the start, their gains are not yet those at rest."""
 
 

@@ -27,8 +27,8 @@ HEAVY = ReducedModel(J1=0.06, J2=0.05, J_d=2e-3, omega_d=150.0, gravity_torque=2
 EPSILON, BOUND = 0.0287, 10.4
 """Defaults that are not a paper's: epsilon of linear_high_gain and L of super_twisting, from `cmg-mj tune`."""
 
-NOISE = MeasurementNoise(0.0063, 0.41, 0.89, 3.1e-4)
-"""The noise of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz."""
+NOISE = MeasurementNoise(0.0063, 0.41, 0.89, 3.1e-4, 8.7e-5, 4e-4)
+"""The noise of the bundled rig's accelerometers, 400 ug/rtHz at 200 Hz, and of its cheap gyro."""
 
 Signal = Sequence[float] | np.ndarray
 
@@ -46,13 +46,18 @@ def columns(*signals: Signal | float) -> list[list]:
 
 
 def run(
-    estimator: Any, y1: Signal, y2: Signal | float = 0.0, u: Signal | float = 0.0, a: Signal | float = math.nan
+    estimator: Any,
+    y1: Signal,
+    y2: Signal | float = 0.0,
+    u: Signal | float = 0.0,
+    a: Signal | float = math.nan,
+    g: Signal | float = math.nan,
 ) -> tuple[np.ndarray, list]:
-    """Estimates after the first sample, (n - 1, 3 or more), and all n states; a is the measured acceleration."""
-    y1, y2, u, a = columns(y1, y2, u, a)
-    states, estimates = [estimator.init(Measurement(y1[0], y2[0], a[0]))], []
+    """Estimates after the first sample, (n - 1, 3 or more), and all n states; a and g: acceleration and gyro."""
+    y1, y2, u, a, g = columns(y1, y2, u, a, g)
+    states, estimates = [estimator.init(Measurement(y1[0], y2[0], a[0], g[0]))], []
     for k in range(1, len(y1)):
-        state, estimate = estimator.step(states[-1], Measurement(y1[k], y2[k], a[k]), u[k - 1])
+        state, estimate = estimator.step(states[-1], Measurement(y1[k], y2[k], a[k], g[k]), u[k - 1])
         states.append(state)
         estimates.append(estimate)
     return np.array(estimates), states

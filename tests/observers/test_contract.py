@@ -27,18 +27,18 @@ def flat(state: Any) -> list:
 
 
 def walk(estimator: Any, samples: Sequence[tuple[Any, ...]]) -> tuple[Any, list[Estimate]]:
-    """Last state and all estimates along samples (y1, y2, acceleration, u held since the sample before)."""
-    state, estimates = estimator.init(Measurement(*samples[0][:3])), []
+    """Last state and all estimates along samples (y1, y2, acceleration, gyro, u held since the sample before)."""
+    state, estimates = estimator.init(Measurement(*samples[0][:-1])), []
     for *y, u in samples[1:]:
         state, estimate = estimator.step(state, Measurement(*y), u)
         estimates.append(estimate)
     return state, estimates
 
 
-def samples(n: int = 60, seed: int = 0) -> list[tuple[float, float, float, float]]:
+def samples(n: int = 60, seed: int = 0) -> list[tuple[float, float, float, float, float]]:
     y1, y2, u = rough_signals(n, seed)
-    acceleration = np.random.default_rng(seed).normal(0.0, 5.0, n).tolist()
-    return list(zip(y1.tolist(), y2.tolist(), acceleration, [0.0, *u.tolist()[:-1]], strict=True))
+    acceleration, gyro = np.random.default_rng(seed).normal(0.0, 5.0, (2, n)).tolist()
+    return list(zip(y1.tolist(), y2.tolist(), acceleration, gyro, [0.0, *u.tolist()[:-1]], strict=True))
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -61,9 +61,10 @@ def test_is_a_frozen_value(kind: str) -> None:
 def test_starts_at_rest_at_the_measured_angles(kind: str) -> None:
     """At the equilibrium nothing moves, so the estimate stays (0, 0, y2) while the measurement does."""
     estimator = observer(kind)
-    state = estimator.init(Measurement(0.0, 0.3, 0.0))
+    rest = Measurement(0.0, 0.3, 0.0, 0.0)
+    state = estimator.init(rest)
     for _ in range(5):
-        state, estimate = estimator.step(state, Measurement(0.0, 0.3, 0.0), 0.0)
+        state, estimate = estimator.step(state, rest, 0.0)
         np.testing.assert_allclose(estimate[:3], (0.0, 0.0, 0.3), rtol=0.0, atol=1e-14)
 
 
@@ -73,7 +74,7 @@ def test_step_has_no_memory_but_the_state(kind: str) -> None:
     estimator, twin = observer(kind), observer(kind)
     state, _ = walk(estimator, samples())
     before = copy.deepcopy(state)
-    y, u = Measurement(0.02, 0.1, 3.0), 1.5
+    y, u = Measurement(0.02, 0.1, 3.0, 0.4), 1.5
     first = estimator.step(state, y, u)
     walk(estimator, samples(seed=1))
     assert flat(estimator.step(state, y, u)) == flat(first)
@@ -85,16 +86,17 @@ def test_step_has_no_memory_but_the_state(kind: str) -> None:
 def test_estimate_uses_the_sample_it_is_given(kind: str) -> None:
     """A filter, not a one-step predictor: y1_k and (for y2's model) y2_k move the estimate of sample k."""
     estimator = observer(kind)
-    state = estimator.init(Measurement(0.0, 0.1, 0.0))
-    _, estimate = estimator.step(state, Measurement(1e-5, 0.1, 0.0), 0.0)
-    _, tilt_estimate = estimator.step(state, Measurement(5e-5, 0.1, 0.0), 0.0)
+    state = estimator.init(Measurement(0.0, 0.1, 0.0, 0.0))
+    _, estimate = estimator.step(state, Measurement(1e-5, 0.1, 0.0, 0.0), 0.0)
+    _, tilt_estimate = estimator.step(state, Measurement(5e-5, 0.1, 0.0, 0.0), 0.0)
     assert abs(tilt_estimate.x2 - estimate.x2) > 1e-6
-    _, gimbal_estimate = estimator.step(state, Measurement(1e-5, 0.3, 0.0), 0.0)
+    _, gimbal_estimate = estimator.step(state, Measurement(1e-5, 0.3, 0.0, 0.0), 0.0)
     assert abs(gimbal_estimate.x3 - estimate.x3) > 1e-4
 
 
 MODELS = ("ltv", "homogeneous", "luenberger", "kalman", "high_gain", "adaptive", "homogeneous_adaptive")
 DIFFERENTIATORS = ("linear", "linear_high_gain", "finite_difference", "super_twisting", "gyro_free", "free_pivot")
+DIFFERENTIATORS += ("mems_fused",)
 
 
 def test_every_observer_is_a_model_or_a_differentiator() -> None:
@@ -115,7 +117,7 @@ def test_models_use_the_command_held_since_the_sample_before(kind: str) -> None:
 def test_differentiators_use_no_model(kind: str) -> None:
     """Neither the command nor the gimbal nor the rig's parameters reach the rate."""
     other_model = dataclasses.replace(PAPER, J1=1.0, J2=0.3, J_d=0.1, omega_d=10.0, gravity_torque=9.0)
-    still = [(y1, 0.0, acceleration, 0.0) for y1, _, acceleration, _ in samples()]
+    still = [(y1, 0.0, *measured, 0.0) for y1, _, *measured, _ in samples()]
     rates = [
         [e.x2 for e in walk(estimator, s)[1]]
         for estimator, s in ((observer(kind), samples()), (observer(kind, model=other_model), still))
@@ -129,7 +131,7 @@ def test_arrays_equal_floats_bit_by_bit(kind: str, n_worlds: int) -> None:
     estimator = observer(kind)
     worlds = [samples(120, seed) for seed in range(n_worlds)]
     batch_samples = [
-        tuple(np.array([world[k][i] for world in worlds]) for i in range(4)) for k in range(len(worlds[0]))
+        tuple(np.array([world[k][i] for world in worlds]) for i in range(5)) for k in range(len(worlds[0]))
     ]
     _, many = walk(estimator, batch_samples)
     for i, world in enumerate(worlds):

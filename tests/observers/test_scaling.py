@@ -36,6 +36,7 @@ STAY: dict[str, dict[str, Unit]] = {
         **dict.fromkeys(("odds_alike", "innovation_weight", "slow_innovation_weight", "gate"), PURE),
         **dict.fromkeys(("pivot_start", "pivot_floor", "rise_factor", "covariance_boost", "inflation"), PURE),
     },
+    "mems_fused": {"rate_start": Unit(-1), "walk_factor": PURE},
     "super_twisting": {"l0": PURE, "l1": PURE},
     "linear_high_gain": {"a1": PURE, "a2": PURE},
     "high_gain": dict.fromkeys(("l1", "l2", "d_inf", "b", "phi1", "phi3"), PURE),
@@ -82,15 +83,17 @@ def estimates(kind: str, scales: Scales, model: ReducedModel) -> np.ndarray:
         NOISE,
         tilt=0.05 * NOISE.tilt,  # less than y1 has: free_pivot learns that
         acceleration=NOISE.acceleration * acceleration,
+        gyro=NOISE.gyro * Unit(-0.5).factor(scales),
+        gyro_walk=NOISE.gyro_walk * Unit(-1.5).factor(scales),
     )
     of_rig = (DT * scales.time, other_rig(model, scales), noise)
     observer = make_observer(kind, *of_rig, **of_all(kind, values, scales))
     y1, y2, u = rough_signals(150)
-    a = np.random.default_rng(0).normal(0.0, 5.0, 150) * acceleration
+    a, g = np.random.default_rng(0).normal(0.0, 5.0, (2, 150)) * [[acceleration], [rate]]
     u = u / scales.time
-    state, rows = observer.init(Measurement(y1[0], y2[0], a[0])), []
+    state, rows = observer.init(Measurement(y1[0], y2[0], a[0], g[0])), []
     for k in range(1, 150):
-        state, estimate = observer.step(state, Measurement(y1[k], y2[k], a[k]), u[k - 1])
+        state, estimate = observer.step(state, Measurement(y1[k], y2[k], a[k], g[k]), u[k - 1])
         rows.append(estimate)
     extra = [EXTRA.get(name, TORQUE).factor(scales) for name in extra_signals(observer)]
     return np.array(rows) / [1.0, rate, 1.0, *extra]
@@ -118,5 +121,11 @@ def test_the_scale_of_time_is_that_of_the_law() -> None:
 
 
 def test_the_sensors_observers_and_a_users_own_stay_as_they_are() -> None:
-    for kind in ("gyro_free", "free_pivot", "finite_difference", "tests.features.tuning.user_observer:UserObserver"):
+    for kind in (
+        "gyro_free",
+        "free_pivot",
+        "mems_fused",
+        "finite_difference",
+        "tests.features.tuning.user_observer:UserObserver",
+    ):
         assert scaled_parameters(kind, HEAVY) == {}

@@ -45,8 +45,9 @@ def assert_alike(jobs: list[BatchJob], batches: list[int], keep_trajectory: bool
 @pytest.mark.slow
 def test_every_observer_beside_the_others_is_as_by_itself(batches: list[int]) -> None:
     assert_alike([run_of(experiment(name), 3) for name in OBSERVERS], batches)
-    kinds = {experiment(name).axis_controller().extra_signals[0] for name in OBSERVERS}
-    assert len(batches) == len(kinds) < len(OBSERVERS)  # what is estimated beyond x is the same in a batch
+    controllers = [experiment(name).axis_controller() for name in OBSERVERS]
+    kinds = {(controller.extra_signals[0], controller.reads_gyro) for controller in controllers}
+    assert len(batches) == len(kinds) < len(OBSERVERS)  # what is estimated beyond x, and the gyro, are common
 
 
 NOISY, QUIET = (f"sensors.accelerometer.noise_density_ug_rthz={density}" for density in (800, 100))

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.features.board.image import build, require
+from cmg_mj.features.board.processor import refuse_gyro
 from cmg_mj.features.board.qemu import Board, Cost
 from cmg_mj.features.export import export
 
@@ -30,8 +31,9 @@ def temporary_export(controller: Controller) -> Iterator[tuple[str, Path]]:
         The controller's name in C, and the folder of the files, which is deleted at the end.
 
     Raises:
-        InputError: The controller cannot be exported.
+        InputError: The controller cannot be exported, or needs a gyro.
     """
+    refuse_gyro(controller.observer)
     with TemporaryDirectory(prefix="cmg_mj-board-") as folder:
         export(controller, Path(folder), precision="single", name="on_board")
         yield "on_board", Path(folder)

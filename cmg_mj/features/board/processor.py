@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller, KnownPlant, Tick
-from cmg_mj.core.errors import RunStopped
+from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.runners import as_estimate
-from cmg_mj.core.types import Forces, Law, Measurement, Observer
+from cmg_mj.core.types import Forces, Law, Measurement, Observer, reads_gyro
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.simulate import SimulationOptions
@@ -52,6 +52,16 @@ class Processor(Protocol):
         ...
 
 
+def refuse_gyro(observer: Observer) -> None:
+    """Refuse an observer that needs the cheap gyro, which no processor is given.
+
+    Raises:
+        InputError: The observer needs it.
+    """
+    if reads_gyro(observer):
+        raise InputError(f"{type(observer).__name__}: a processor in the loop reads no gyro; take another observer")
+
+
 class _RemoteObserver:
     """Stands for the observer that a processor runs: what it estimates has just been decided."""
 
@@ -88,6 +98,7 @@ class ProcessorController(Controller):
         plant: KnownPlant,
         **options: Any,
     ) -> None:
+        refuse_gyro(observer)
         self.processor = processor
         self._remote = _RemoteObserver(observer)
         super().__init__(self._remote, law, sensors, plant, **options)
@@ -98,7 +109,15 @@ class ProcessorController(Controller):
         super().reset()
         self.processor.start()
 
-    def decide(self, step: int, forces: Forces, encoders: Sequence[Scalar], fog: Scalar, rate: Scalar) -> Tick:
+    def decide(
+        self,
+        step: int,
+        forces: Forces,
+        encoders: Sequence[Scalar],
+        fog: Scalar,
+        rate: Scalar,
+        gyro: Scalar = math.nan,
+    ) -> Tick:
         """Let the processor decide on the samples that have been delivered; see `Controller.decide`."""
         try:
             decision = self.processor.update(tuple(forces), encoders)
@@ -106,7 +125,7 @@ class ProcessorController(Controller):
             raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
         self._remote.estimate = decision.estimate
         is_first = self.tick is None
-        tick = super().decide(step, forces, encoders, fog, rate)
+        tick = super().decide(step, forces, encoders, fog, rate, gyro)
         trim = trim_of(self)
         trimmed = step < trim.until
         x_e = trim.gain * decision.estimate[trim.part] if trimmed else decision.x_e

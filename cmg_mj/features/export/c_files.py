@@ -79,6 +79,7 @@ class CodePrinter:
         count = "    long updates; /* so far, while the integrator is trimmed */\n" if self.constants.trimmed else ""
         wrong_format, complaint = REQUIRED_FORMATS[self.precision]
         law = self.traced.law
+        gyro = " * gyro: what it shows, offset included [rad/s]\n" if len(self.traced.measured) > 3 else ""
         integrator = "integrator [rad s]" if law.has_integrator else "NaN: the law has no integrator"
         return f"""{format_header_comment(n, self.controller, self.precision)}
 #ifndef {N}_H
@@ -127,7 +128,7 @@ extern "C" {{
  * accelerations: specific force as the two accelerometers show it, inner x, inner z, outer x, outer z [m/s^2];
  *     x along the tilt's motion, z outward
  * encoders: the gimbals' angles [rad]
- * estimate: what the observer makes of it
+{gyro} * estimate: what the observer makes of it
  * u: gimbal rate to hold until the next update, each gimbal with its direction's sign [rad/s]
  * update returns {N}_OK; or, once a number was not finite, in or out, and until start is called again, which:
  *     then u and the estimate are 0 */
@@ -138,7 +139,7 @@ extern "C" {{
  * y1: tilt [rad]
  * y2: gimbal angle [rad]
  * acceleration: of the tilt [rad/s^2]
- * u: gimbal rate held since the sample before [rad/s] */
+{gyro} * u: gimbal rate held since the sample before [rad/s] */
 {self._declaration("init")};
 {self._declaration("step")};
 
@@ -152,8 +153,9 @@ extern "C" {{
     def source(self) -> str:
         """Print NAME.c."""
         n, N, real, traced = self.name, self.name.upper(), f"{self.name}_real", self.traced
-        constants, measured = self.constants, list(MEASURED)
+        constants, measured = self.constants, traced.measured
         raw = [f"accelerations[{i}]" for i in range(4)] + [f"encoders[{i}]" for i in range(constants.gimbals)]
+        taken, gyro = [*raw, *measured[3:]], "".join(f", {name}" for name in measured[3:])
         state = [f"state->{member}" for member in traced.state]
         estimate = [f"estimate[{i}]" for i in range(len(self.places))]
         results = [
@@ -192,17 +194,17 @@ static int is_finite({real} x)
 /* Tilt, gimbal angle and the tilt's acceleration from what the sensors show. */
 {self._declaration("measure")}
 {{
-{self._body(traced.measure, raw + _names(constants.of_measure), [f"*{name}" for name in measured])}}}
+{self._body(traced.measure, raw + _names(constants.of_measure), [f"*{name}" for name in MEASURED])}}}
 
 {self.law.functions(self._body)}
 {self._declaration("init")}
 {{
-    (void)state, (void)y1, (void)y2, (void)acceleration;
+    (void)state, {self._void(measured)};
 {self._body(traced.init, measured, state)}}}
 
 {self._declaration("step")}
 {{
-    (void)state, (void)y1, (void)y2, (void)acceleration, (void)u;
+    (void)state, {self._void(measured)}, (void)u;
 {self._body(traced.step, [*state, *measured, "u"], [*state, *estimate])}}}
 
 {self._declaration("start")}
@@ -219,15 +221,15 @@ static int is_finite({real} x)
     int i;
 
     if (controller->status == {N}_OK) {{
-        if (!({_are_finite(raw)}))
+        if (!({_are_finite(taken)}))
             controller->status = {N}_INPUT_NOT_FINITE;
     }}
     if (controller->status == {N}_OK) {{
         measure(accelerations, encoders, &y1, &y2, &acceleration);
         if (controller->started) {{
-            {n}_step(&controller->observer, y1, y2, acceleration, controller->u, estimate);
+            {n}_step(&controller->observer, y1, y2, acceleration{gyro}, controller->u, estimate);
         }} else {{
-            {n}_init(&controller->observer, y1, y2, acceleration);
+            {n}_init(&controller->observer, y1, y2, acceleration{gyro});
 {f"            {init_call}" + chr(10) if init_call else ""}{first}            controller->started = 1;
         }}
 {trim if constants.trimmed else ""}        {law_call}
@@ -252,15 +254,20 @@ static int is_finite({real} x)
             f"{real} estimate[{N}_ESTIMATES]",
         )
         raw = (f"const {real} accelerations[4]", f"const {real} encoders[{N}_ENCODERS]")
-        y = tuple(f"{real} {name}" for name in MEASURED)
+        y = tuple(f"{real} {name}" for name in self.traced.measured)
         head, parameters = {
             "start": (f"void {n}_start", (controller,)),
-            "update": (f"{n}_status {n}_update", (controller, *raw, estimate, f"{real} *u")),
+            "update": (f"{n}_status {n}_update", (controller, *raw, *y[3:], estimate, f"{real} *u")),
             "init": (f"void {n}_init", (state, *y)),
             "step": (f"void {n}_step", (state, *y, f"{real} u", estimate)),
             "measure": ("static void measure", (*raw, *(f"{real} *{name}" for name in MEASURED))),
         }[function]
         return function_head(head, parameters)
+
+    @staticmethod
+    def _void(names: Sequence[str]) -> str:
+        """Print what tells a compiler that parameters may be unused."""
+        return ", ".join(f"(void){name}" for name in names)
 
     def _numbers(self) -> str:
         """Print the constants with their meanings."""
@@ -288,21 +295,23 @@ Table = Sequence[Sequence[float]]
 
 
 def format_test_vector(
-    name: str, precision: Precision, inputs: Table, expected: Table, allowed: Sequence[float]
+    name: str, precision: Precision, inputs: Table, expected: Table, allowed: Sequence[float], gyro: bool
 ) -> str:
     """Format NAME_test_vector.h.
 
     Args:
         name: Name of the export.
         precision: Precision of its numbers.
-        inputs: Raw accelerations and encoders, a row for each update.
+        inputs: Raw accelerations, encoders and, if it is read, the gyro, a row for each update.
         expected: The estimate and u by Python, a row for each update.
         allowed: The allowed difference of each column of `expected`.
+        gyro: Whether the gyro is read.
 
     Returns:
         The text.
     """
     n, N, real = name, name.upper(), f"{name}_real"
+    more, unit = (" + 1", "; gyro [rad/s]") if gyro else ("", "")
     return f"""/* What {n}.c was compared on when it was written. */
 #ifndef {N}_TEST_VECTOR_H
 #define {N}_TEST_VECTOR_H
@@ -311,8 +320,8 @@ def format_test_vector(
 
 #define {N}_TICKS {len(inputs)}
 
-/* A row an update: raw accelerations, inner x, inner z, outer x, outer z [m/s^2]; encoders [rad]. */
-static const {real} {n}_inputs[{N}_TICKS][4 + {N}_ENCODERS] = {{
+/* A row an update: raw accelerations, inner x, inner z, outer x, outer z [m/s^2]; encoders [rad]{unit}. */
+static const {real} {n}_inputs[{N}_TICKS][4 + {N}_ENCODERS{more}] = {{
 {_rows(inputs, precision)}}};
 
 /* What cmg_mj makes of them: the estimate, then u [rad/s]. */
@@ -326,18 +335,20 @@ static const {real} {n}_allowed[{N}_ESTIMATES + 1] = {_row(allowed, precision)};
 """
 
 
-def format_example(name: str, precision: Precision, parts: Sequence[str]) -> str:
+def format_example(name: str, precision: Precision, parts: Sequence[str], gyro: bool) -> str:
     """Format NAME_example.c.
 
     Args:
         name: Name of the export.
         precision: Precision of its numbers.
         parts: Names of the compared columns: the parts of an estimate, and u.
+        gyro: Whether the gyro is read.
 
     Returns:
         The text.
     """
     n, N, real = name, name.upper(), f"{name}_real"
+    reading, none = (f", {n}_inputs[tick][4 + {N}_ENCODERS]", ", 0") if gyro else ("", "")
     listed = ", ".join(f'"{part}"' for part in parts)
     return f"""/* How {n}.c is used, and whether it does here what it does in cmg_mj:
  *
@@ -359,7 +370,7 @@ int main(void)
     for (tick = 0; tick < {N}_TICKS; ++tick) {{
         /* On a board: read the sensors here, and give u to the gimbals. */
         {real} difference;
-        if ({n}_update(&controller, {n}_inputs[tick], {n}_inputs[tick] + 4, estimate, &u) != {N}_OK) {{
+        if ({n}_update(&controller, {n}_inputs[tick], {n}_inputs[tick] + 4{reading}, estimate, &u) != {N}_OK) {{
             printf("update %d: a number is not finite\\n", tick);
             return 1; /* On a board: u is 0 until {n}_start is called. */
         }}
@@ -371,7 +382,7 @@ int main(void)
         }}
     }}
     broken[0] = {literal(math.inf, precision)}; /* a sensor that is broken */
-    if ({n}_update(&controller, broken, broken + 4, estimate, &u) != {N}_INPUT_NOT_FINITE || u < 0 || u > 0) {{
+    if ({n}_update(&controller, broken, broken + 4{none}, estimate, &u) != {N}_INPUT_NOT_FINITE || u < 0 || u > 0) {{
         puts("u is NOT held at 0 after a reading that is not finite");
         wrong = 1;
     }}

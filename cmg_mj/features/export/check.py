@@ -16,7 +16,7 @@ import numpy as np
 from cmg_mj.core.arrays import clip
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.types import STATE_SIGNALS
+from cmg_mj.core.types import STATE_SIGNALS, reads_gyro
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.compiler import build, run
 from cmg_mj.features.export.constants import Constants
@@ -35,6 +35,7 @@ ROUNDINGS = 4
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 GRAVITY = 9.81
+GYRO_OFFSET = 0.35
 
 
 def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
@@ -46,7 +47,7 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
         precision: Precision in which the numbers are exact.
 
     Returns:
-        Raw accelerations [m/s^2] and encoders [rad], (TICKS, 4 + gimbals).
+        Raw accelerations [m/s^2], encoders [rad] and, if it is read, the gyro [rad/s], (TICKS, 4 + gimbals + 0 or 1).
     """
     rng = np.random.default_rng(seed)
     t = controller.law.dt * np.arange(TICKS)
@@ -59,7 +60,10 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     gimbal = 5.0 * size * np.sin(w[0] * t)
     gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
     encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]
-    samples = np.array([force + noise * rng.normal(size=TICKS) for force in forces] + encoders).T
+    shown = [force + noise * rng.normal(size=TICKS) for force in forces] + encoders
+    if reads_gyro(controller.observer):
+        shown.append(GYRO_OFFSET + np.gradient(tilt, t) + 0.1 * noise * rng.normal(size=TICKS))
+    samples = np.array(shown).T
     samples[-TICKS // 4 :] = samples[-TICKS // 4]  # equal readings, as a resolution makes them
     return samples.astype(np.float32).astype(float) if precision == "single" else samples
 
@@ -74,9 +78,9 @@ def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
         angle_source=controller.angle_source,
         memories=controller.memories,
     )
-    rows = []
+    rows, end = [], 4 + len(fresh.gimbal_angle.zeros)
     for k, row in enumerate(samples.tolist()):
-        tick = fresh.decide(k * fresh.period, row[:4], row[4:], 0.0, 0.0)
+        tick = fresh.decide(k * fresh.period, row[:4], row[4:end], 0.0, 0.0, *row[end:])
         rows.append([*tick.estimates[0], tick.u])
     return np.array(rows)
 
@@ -94,20 +98,21 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
 
     of_measure, of_law = ([part.value for part in parts] for parts in (constants.of_measure, constants.of_law))
     law, limit, extra, n = traced.law, of_law[-1], len(controller.extra_signals[0]), len(traced.state)
+    end = 4 + constants.gimbals
     law_state, law_constants = [*law.state, "x_e"][: law.numbers], of_law if law.is_state_feedback else []
     state, memory, rows, u = [0.0], [0.0], [], 0.0
     for k, row in enumerate(samples.tolist()):
-        y = values(traced.measure, *row, *of_measure)
+        y = [*values(traced.measure, *row[:end], *of_measure), *row[end:]]
         if k == 0:
             state, estimate = values(traced.init, *y), [y[0], 0.0, y[1], *[0.0] * extra]
-            memory = memory if law.init is None else values(law.init, *y)
+            memory = memory if law.init is None else values(law.init, *y[:3])
         else:
             result = values(traced.step, *state, *y, u)
             state, estimate = result[:n], result[n:]
         if k < constants.trimmed:
             memory[-1] = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
-        known = dict(zip(law_arguments(extra), [*y, x1, estimate[1], x3, *estimate[3:], u], strict=True))
+        known = dict(zip(law_arguments(extra), [*y[:3], x1, estimate[1], x3, *estimate[3:], u], strict=True))
         u, *memory = values(law.step, *(known[name] for name in law.arguments), *memory, *law_constants)
         u = clip(u, -limit, limit)
         for refusal, names, numbers in ((InputError, traced.state, state), (LawNotExportable, law_state, memory)):

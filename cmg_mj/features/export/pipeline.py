@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, raised, shown
+from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision, operations
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
@@ -86,11 +87,12 @@ def _generate(controller: Controller, precision: Precision, name: str) -> Code:
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
     allowed = check.allowed(controller, samples, expected, precision)
-    vector = format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist())
+    gyro = reads_gyro(controller.observer)
+    vector = format_test_vector(name, precision, samples.tolist(), expected.tolist(), allowed.tolist(), gyro)
     files = {
         f"{name}.h": printer.header(),
         f"{name}.c": printer.source(),
-        f"{name}_example.c": format_example(name, precision, check.columns(controller)),
+        f"{name}_example.c": format_example(name, precision, check.columns(controller), gyro),
         f"{name}_test_vector.h": vector,
     }
     compiler = find_compiler()

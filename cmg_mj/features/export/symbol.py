@@ -167,6 +167,7 @@ def _where(condition: Operand, a: Operand, b: Operand) -> Operand:
 Result = TypeVar("Result")
 
 MEASURED = ("y1", "y2", "acceleration")
+GYRO = "gyro"
 """Names of an observer's measurements."""
 
 MAX_NUMBERS = 1000

@@ -9,10 +9,11 @@ import casadi
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import GimbalAngle, RadialTilt
-from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state
+from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state, reads_gyro
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
 from cmg_mj.features.export.symbol import (
+    GYRO,
     MAX_NUMBERS,
     MEASURED,
     LawNotExportable,
@@ -33,13 +34,15 @@ class Traced(NamedTuple):
 
     Attributes:
         state: Names of the numbers in the observer's state that a result depends on.
+        measured: Names of what the observer takes: `MEASURED`, and the gyro if it needs one.
         measure: (raw accelerations, encoders, constants) -> y1, y2, acceleration.
-        init: (y1, y2, acceleration) -> state.
-        step: (state, y1, y2, acceleration, u) -> state, estimate.
+        init: (measured) -> state.
+        step: (state, measured, u) -> state, estimate.
         law: The law's formulas.
     """
 
     state: tuple[str, ...]
+    measured: tuple[str, ...]
     measure: casadi.Function
     init: casadi.Function
     step: casadi.Function
@@ -62,9 +65,10 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
         LawNotExportable: A formula cannot express what the law does.
     """
     with as_written():
-        y, (u,) = symbols_named(MEASURED), symbols_named(["u"])
+        measured = (*MEASURED, GYRO) if reads_gyro(observer) else MEASURED
+        y, (u,) = symbols_named(measured), symbols_named(["u"])
         first, _, leaves, symbols, after, outputs = _record(
-            observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u)
+            observer, "step(state, y, u)", lambda before: observer.step(before, Measurement(*y), u), measured
         )
         needed = needed_numbers(symbols, after, outputs)
         names = identifiers([leaves[i].path for i in needed])
@@ -77,11 +81,14 @@ def trace(observer: Observer, law: Law, constants: Constants) -> Traced:
                 law_formulas = _trace_law(law, len(extra_signals(observer)))
             except InputError as error:
                 raise LawNotExportable(str(error)) from error
-        return Traced(tuple(names), _measure(constants), init, step, law_formulas)
+        return Traced(tuple(names), measured, _measure(constants), init, step, law_formulas)
 
 
 def _record(
-    part: Observer | Law, label: str, step: Callable[[Any], tuple[Any, Sequence[Any]]]
+    part: Observer | Law,
+    label: str,
+    step: Callable[[Any], tuple[Any, Sequence[Any]]],
+    measured: Sequence[str] = MEASURED,
 ) -> tuple[list[Symbol], Any, list[Leaf], list[Symbol], list[casadi.SX], list[casadi.SX]]:
     """Run a part's init and, with symbols in the place of its state's numbers, a step.
 
@@ -89,7 +96,7 @@ def _record(
         The measurement that init took; its state, and the numbers in it; a symbol for each of them, which the step
         took; the numbers in the state that the step returned; what it returned beside the state.
     """
-    first = symbols_named(MEASURED)
+    first = symbols_named(measured)
     state = call_traced("init(y)", lambda: part.init(Measurement(*first)))
     leaves = list(numbers(state))
     if len(leaves) > MAX_NUMBERS:

@@ -229,12 +229,13 @@ class ScissoredPairEnv(gymnasium.Env):
         y = [tilt(*forces), controller.gimbal_angle(encoders), *(extra[name] for name in self._readings)]
         high = self.observation_space.high  # pyright: ignore[reportAttributeAccessIssue]
         observation = np.clip(np.array(y, dtype=np.float64), -high, high)
+        gyro = [controller.read_gyro(step)] if controller.reads_gyro else []
         info = {
             "time_s": step * controller.timestep,
             "x1_rad": x1,
             "x2_rad_s": x2,
             "x3_rad": x3,
-            "readings": (step, tuple(forces), tuple(encoders), fog, x2),
+            "readings": (step, tuple(forces), tuple(encoders), fog, x2, *gyro),
         }
         return observation, info
 

@@ -12,7 +12,7 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of
 from cmg_mj.core.sensor import steps_until, whole_steps
-from cmg_mj.core.types import STANDARD_GRAVITY
+from cmg_mj.core.types import STANDARD_GRAVITY, reads_gyro
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.sensors.gyros import PIECE, Fog, MemsGyro
 from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
@@ -151,6 +151,7 @@ def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
             "angle_step": encoder.resolution,
         },
         **({"fog": _describe_fog(fog, controller.axis, clock)} if controller.feedback == "fog" else {}),
+        **({"mems_gyro": _describe_own_gyro(controller)} if reads_gyro(controller.observer) else {}),
         "raw_rate": pair.raw_rate_hz,
         "joint": axis.joint,
         "dofs": len(axis.shares),
@@ -202,10 +203,17 @@ def _describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
     }
 
 
-def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
-    """Describe the gyro about the vertical, read every dt [s]: `turn_gyro_type` in C."""
+def _describe_own_gyro(controller: Controller) -> Struct:
+    """Describe the cheap gyro of an axis, whose reading the observer takes."""
+    streams = (stream.on_axis(controller.axis) for stream in (NoiseStream.MEMS_GYRO, NoiseStream.MEMS_PART))
+    return describe_mems_gyro(controller.sensors.mems_gyro, controller.law.dt, *streams)
+
+
+def describe_mems_gyro(gyro: MemsGyro, dt: float, stream: int, part_stream: int = 0) -> Struct:
+    """Describe a cheap gyro, read every dt [s]: `mems_gyro_type` in C."""
     return {
-        "stream": NoiseStream.TURN_GYRO,
+        "stream": stream,
+        "part_stream": part_stream,
         "resting": round(gyro.calibration_s / dt),
         "piece": PIECE,
         "sigma": gyro.white_noise_sigma(dt),
@@ -213,6 +221,9 @@ def describe_turn_gyro(gyro: MemsGyro, dt: float) -> Struct:
         "step": math.radians(1.0 / gyro.counts_per_deg_s) if gyro.counts_per_deg_s else 0.0,
         "scale": 1.0 + gyro.scale_error,
         "bias": math.radians(gyro.bias_deg_s),
+        "is_as_bought": int(gyro.reading == "as_bought"),
+        "offset": math.radians(gyro.as_bought_offset_deg_s),
+        "drift": math.radians(gyro.as_bought_drift_deg_s_k * gyro.warming_k_min / 60.0) * dt,
         **_flicker(gyro.flicker_floor, dt),
     }
 

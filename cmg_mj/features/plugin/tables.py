@@ -11,6 +11,7 @@ import json
 import platform
 import shlex
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
@@ -18,6 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import compiler as c_compiler
 from cmg_mj.features.export import generate_code
 from cmg_mj.features.plugin.sensors import (
@@ -26,7 +29,7 @@ from cmg_mj.features.plugin.sensors import (
     Value,
     clock_of,
     describe_axis,
-    describe_turn_gyro,
+    describe_mems_gyro,
     refuse_unsupported,
 )
 from cmg_mj.stages.backlash import Backlash
@@ -131,7 +134,7 @@ def c_text(text: str) -> str:
 NAMES_IN_USE = frozenset(
     """
     axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
-    setup show spin state turn_gyro turning ziggurat
+    setup show spin state mems_gyro turning ziggurat
     """.split()  # noqa: SIM905
 )
 """Names that would clash with the C that all plugins have in common."""
@@ -198,6 +201,7 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
         The text.
     """
     controller = axis.controller
+    y = "y[0], y[1], y[2], y[3]" if reads_gyro(controller.observer) else "y[0], y[1], y[2]"
     n, trim, formulas = name, trim_of(controller), law.law
     gap = sum(stage.gap for stage in controller.servo_stages if isinstance(stage, Backlash))
     trimmed = -(-trim.until // controller.period)
@@ -210,6 +214,7 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
         "trim_part": trim.part if trimmed else 0,
         "trim_gain": trim.gain if trimmed else 0.0,
         "angles_are_estimated": int(controller.angle_source == "estimated"),
+        "reads_gyro": int(reads_gyro(controller.observer)),
         "rate_limit": controller.law.rate_limit,
         "has_backlash": int(gap > 0.0),
         "half_gap": gap / 2.0,
@@ -227,18 +232,18 @@ static void controller_measure(const double *forces, const double *encoders, dou
     measure(forces, encoders, &y[0], &y[1], &y[2]);
 }}
 
-static void observer_init(double *memory, const double y[3])
+static void observer_init(double *memory, const double y[4])
 {{
     {n}_state state = {{0}};
-    {n}_init(&state, y[0], y[1], y[2]);
+    {n}_init(&state, {y});
     memcpy(memory, &state, sizeof state);
 }}
 
-static void observer_step(double *memory, const double y[3], double u, double *estimate)
+static void observer_step(double *memory, const double y[4], double u, double *estimate)
 {{
     {n}_state state;
     memcpy(&state, memory, sizeof state);
-    {n}_step(&state, y[0], y[1], y[2], u, estimate);
+    {n}_step(&state, {y}, u, estimate);
     memcpy(memory, &state, sizeof state);
 }}
 
@@ -304,7 +309,8 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     if rig.turning is not None:
         coupling, gyro = rig.turning
         matrices = {name: matrix.tolist() for name, matrix in coupling._asdict().items()}
-        described = {"gyro": describe_turn_gyro(gyro, first.law.dt), **matrices}
+        calibrated = replace(gyro, reading="calibrated")
+        described = {"gyro": describe_mems_gyro(calibrated, first.law.dt, NoiseStream.TURN_GYRO), **matrices}
         turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
     fields = {
         "plugin": rig.plugin,

@@ -46,7 +46,7 @@ _OPTIONS = (
         multiple=True,
         metavar="ROLE=HEADING,...",
         help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
-        "outer_z, acceleration, gimbal (or gimbal1, gimbal2) and command, or torque. Not for a run's own recording.",
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2) and command, or torque, gyro. Not for a run's own recording.",
     ),
     click.option(
         "--units",
@@ -99,7 +99,7 @@ noise_option = click.option(
     default="",
     metavar="NAME=VALUE,...",
     help="Sensor noise that observers assume: accelerometer [ug/rtHz], or tilt [deg] and acceleration [rad/s^2] of "
-    "one sample.  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
+    "one sample; gyro [deg/s/rtHz].  [default: from the log, or else accelerometer=400, or tilt=0.1,acceleration=1]",
 )
 
 

@@ -135,10 +135,11 @@ class Log:
     Attributes:
         name: Name of the file, without its ending.
         dt: Sample period [s].
-        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `reference_rad_s`, each (n,). Where
+        columns: `time_s`, `y1_rad`, `y2_rad`, `u_rad_s`, `acceleration_rad_s2`, `mems_gyro_rad_s`,
+            `reference_rad_s`, each (n,). Where
             the log lacks a signal, y2 and u are zero, the others NaN.
         parts: Slices without a gap; the observers start at the beginning of each.
-        has: Signals of the log among "gimbals" (y2 and u), "acceleration" and "reference".
+        has: Signals of the log among "gimbals" (y2 and u), "acceleration", "gyro" and "reference".
         tilt: Geometry of the accelerometers, if their places are known.
         windows: Windows that are scored separately [s].
         notes: Changes to the rows that were not requested, and likely mistakes, a line each.
@@ -249,6 +250,7 @@ ROLES: dict[str, Quantity] = {
     "gimbal2": "angle",
     "command": "rate",
     "torque": "torque",
+    "gyro": "rate",
     "rate": "rate",
 }
 """Role -> quantity of its column.
@@ -257,7 +259,7 @@ ROLES: dict[str, Quantity] = {
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
 `gimbal2`, whose half difference it is), `command` their rate, `torque` a known torque that tilts the rig instead of
-gimbals, `rate` the reference.
+gimbals, `gyro` a gyro that observers take, `rate` the reference.
 """
 
 _ASSIGNMENT = re.compile(
@@ -338,6 +340,10 @@ def columns_of(options: ReadOptions) -> dict[str, Column]:
         raise InputError("--columns: name either gimbal, or gimbal1 and gimbal2")
     if "torque" in names and names.keys() & {"gimbal", "gimbal1", "command"}:
         raise InputError("--columns: name either a torque, or gimbal and command")
+    if "gyro" in names and names["gyro"] == names.get("rate"):
+        raise InputError(
+            f"--columns gyro={names['gyro']}: is the reference too; name another column, or leave rate out"
+        )
     found = {role: _column(role, name, options) for role, name in names.items()}
     for accelerometer in options.rig.accelerometer:
         size = UNITS["acceleration"].get(_plain(accelerometer.unit))

@@ -25,7 +25,7 @@ from cmg_mj.observers.parameter_options import Parameters, ParameterValue, numbe
 from cmg_mj.observers.scaling import scaled_parameters
 from cmg_mj.results.baselines import ZERO
 from cmg_mj.results.summary_keys import Figures
-from cmg_mj.results.trajectory import Layout, NamedColumns, Trajectory
+from cmg_mj.results.trajectory import GYRO, Layout, NamedColumns, Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.runs.open_loop import replay_all
 from cmg_mj.scenario.loading import parse_scenario
@@ -41,6 +41,7 @@ NEEDS_IN_WORDS = {
     "model": "a model (--model)",
     "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
     "acceleration": "two accelerometers (--columns inner_x=...) or the angular acceleration",
+    "gyro": "a gyro (--columns gyro=...; of a run, run it with --set open_loop_observers='[\"mems_fused\"]')",
 }
 NUMBERS = {
     "inertia": "tilt inertia about the pivot, J1 [kg m^2]",
@@ -236,7 +237,7 @@ def _estimates(observer: Observer, log: Log) -> Mapping[str, np.ndarray] | str:
 
 
 def _with_noise(log: Log, noise: MeasurementNoise) -> Log:
-    """Add noise to the tilt, and to the angular acceleration if there is one, with the given correlation."""
+    """Add noise to the tilt, and to angular acceleration and gyro, if there are any, with the given correlation."""
     random = np.random.default_rng(SEED)
     first, other = random.standard_normal(len(log)), random.standard_normal(len(log))
     second = noise.correlation * first + math.sqrt(1.0 - noise.correlation**2) * other
@@ -244,6 +245,8 @@ def _with_noise(log: Log, noise: MeasurementNoise) -> Log:
         "y1_rad": log["y1_rad"] + noise.tilt * first,
         "acceleration_rad_s2": log["acceleration_rad_s2"] + noise.acceleration * second,
     }
+    if "gyro" in log.has:
+        noisy[GYRO] = log[GYRO] + noise.gyro * math.sqrt(0.5 / log.dt) * random.standard_normal(len(log))
     return replace(log, columns={**log.columns, **noisy})
 
 
@@ -305,7 +308,9 @@ def observer_inputs(
     if log.scenario is None:
         if model and model.gravity_torque > 0.0:  # the papers' parameters are for their rig
             scaled = {kind: scaled_parameters(kind, model) for kind in OBSERVERS}
-            parameters = {kind: {**scaled.get(kind, {}), **parameters.get(kind, {})} for kind in {**scaled, **parameters}}
+            parameters = {
+                kind: {**scaled.get(kind, {}), **parameters.get(kind, {})} for kind in {**scaled, **parameters}
+            }
         return ObserverInputs(model, noise_of(log, noises), parameters)
     part = prepare(parse_scenario(dict(log.scenario), log.name)).require_single_axis("replay")
     scenario, plant, loop = part.scenario, part.plant.parameters, part.scenario.observer

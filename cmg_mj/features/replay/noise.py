@@ -19,7 +19,9 @@ from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import EVEN, Log, LogNoise, Segment, Values, WhiteNoise
 from cmg_mj.observers.parameter_options import numbers
 from cmg_mj.results.summary_keys import SummaryValue
+from cmg_mj.results.trajectory import GYRO
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
+from cmg_mj.sensors.gyros import MemsGyro
 
 SEGMENT = 128
 """Rows of a segment of Welch's spectrum; segments overlap by half, under Hann's window."""
@@ -288,6 +290,42 @@ def _correlation(spectra: np.ndarray) -> float:
 
 
 def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> MeasurementNoise:
+    """Return the noise of a log's sensors that observers assume: see `_without_gyro`; the gyro's if it has one.
+
+    The walk of the gyro's bias is the datasheet's of the bench's cheap gyro: no log of minutes tells it.
+    """
+    noises = dict(noises or {})
+    given = noises.pop("gyro", None)
+    if given is not None and "gyro" not in log.has:
+        raise InputError("--noise gyro: the log has no gyro; name its column, --columns gyro=...")
+    noise = _without_gyro(log, noises)
+    if "gyro" not in log.has:
+        return noise
+    density = gyro_noise(log)[0] if given is None else math.radians(given)
+    return replace(noise, gyro=density, gyro_walk=MemsGyro().flicker_floor)
+
+
+def gyro_noise(log: Log) -> tuple[float, str]:
+    """Return the density of the white noise of a log's gyro [rad/s/sqrt(Hz)], and its origin in words.
+
+    Without a white floor (vibration, resolution) it is that of the upper band, which is no less than the noise.
+    """
+    residuals = [
+        _without_motion(np.arange(part.stop - part.start), log[GYRO][part])
+        for part in log.parts
+        if part.stop - part.start >= 2 * TAPS + SEGMENT
+    ]
+    if sum(map(len, residuals)) < MIN_ROWS:
+        return math.radians(MemsGyro().noise_density_deg_s_rthz), "the datasheet's of a cheap one: the log is short"
+    power = np.concatenate([np.abs(_spectra(residual[None])[0]) ** 2 for residual in residuals])
+    floor = _floor(1.0, power, smallest_step(log[GYRO]), float(np.std(log[GYRO])))
+    if isinstance(floor, WhiteNoise):
+        return floor.sigma * math.sqrt(2.0 * log.dt), "the log's white floor"
+    upper = math.sqrt(float(power[_steady(power)][:, _columns(FLOORS[-1][0])].mean()))
+    return upper * math.sqrt(2.0 * log.dt), f"that of the log's upper band, for {floor}"
+
+
+def _without_gyro(log: Log, noises: Mapping[str, float]) -> MeasurementNoise:
     """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
 
     Args:
@@ -300,7 +338,7 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
     Raises:
         InputError: A noise belongs to another sensor than the log's.
     """
-    noises, shown, gimbal = noises or {}, log.white_noise, Encoder().sample_sigma
+    shown, gimbal = log.white_noise, Encoder().sample_sigma
     own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
     placed = log.options.rig.accelerometer
     if log.tilt is not None and all(one.noise_m_s2 for one in placed) and placed:
@@ -326,7 +364,7 @@ def noise_of(log: Log, noises: Mapping[str, float] | None = None) -> Measurement
 
 def noise_numbers(text: str) -> dict[str, float]:
     """Parse `--noise tilt=0.05,acceleration=2` [ug/rtHz, deg, rad/s^2]."""
-    noises = numbers(text, "--noise", ("accelerometer", "tilt", "acceleration")) if text.strip() else {}
+    noises = numbers(text, "--noise", ("accelerometer", "tilt", "acceleration", "gyro")) if text.strip() else {}
     for name, value in noises.items():
         if not value > 0.0:
             raise InputError(f"--noise {name}={value:g}: must be greater than 0")
@@ -355,11 +393,21 @@ def noise_remarks(log: Log, noise: MeasurementNoise) -> list[str]:
     if log.tilt is not None and not log.tilt.has_angle:
         density = 1e-6 * STANDARD_GRAVITY * math.sqrt(_sampling_rate(log) / 2.0)
         of_tilt = 1.0 / (log.tilt.noise().tilt * density)
-        return [_remark("accelerometer", noise.tilt, shown.tilt, of_tilt, "ug/rtHz")]
+        return [_remark("accelerometer", noise.tilt, shown.tilt, of_tilt, "ug/rtHz"), *_gyro_remark(log, noise)]
     lines = [_remark("tilt", noise.tilt, shown.tilt, math.degrees(1.0), "deg")]
     if shown.acceleration is not None:
         lines.append(_remark("acceleration", noise.acceleration, shown.acceleration, 1.0, "rad/s^2"))
-    return lines
+    return [*lines, *_gyro_remark(log, noise)]
+
+
+def _gyro_remark(log: Log, noise: MeasurementNoise) -> list[str]:
+    """Describe the noise of a gyro, if the log has one."""
+    if "gyro" not in log.has:
+        return []
+    (shown, origin), used = gyro_noise(log), f"{math.degrees(noise.gyro):.3g} deg/s/rtHz is used"
+    if noise.gyro == shown:
+        return [f"Noise of the gyro: {used}: {origin}."]
+    return [f"Noise of the gyro: {used}; {math.degrees(shown):.3g} is {origin}."]
 
 
 def _remark(name: str, used: float, shown: WhiteNoise | str, factor: float, unit: str) -> str:

@@ -31,7 +31,7 @@ from cmg_mj.features.replay.log import (
 )
 from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.features.replay.rig import PlacedAccelerometer
-from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.results.trajectory import GYRO, Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.stages.push import Window, inside, push_windows
 
@@ -143,7 +143,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     notes += _gravity_remarks(signals, options.scale)
     if "ax" in signals:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
-    needed = {"gimbals": {"y2_rad", HELD}, "acceleration": {"acceleration_rad_s2"}, "reference": {"rate"}}
+    needed = {"gimbals": {"y2_rad", HELD}, "acceleration": {"acceleration_rad_s2"}}
+    needed |= {"gyro": {GYRO}, "reference": {"rate"}}
     ends = np.cumsum([0, *(len(segment.time) for segment in segments)]).tolist()
     return Log(
         path.stem,
@@ -169,6 +170,7 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
         trajectory = Trajectory.load(path)
         scenario = trajectory.metadata["scenario"]
         run = parse_scenario(dict(scenario), str(path))
+        names += (GYRO,) if GYRO in trajectory else ()
         columns = {name: trajectory[name] for name in names if not trajectory.axes}
     except (LookupError, TypeError, ValueError) as error:
         raise InputError(
@@ -192,7 +194,7 @@ def _read_run(path: Path, options: ReadOptions) -> Log:
         dt,
         {**columns, REFERENCE: columns.pop("x2_rad_s")},
         [slice(0, len(time))],
-        frozenset({"gimbals", "acceleration", "reference"}),
+        frozenset({"gimbals", "acceleration", "reference", *(["gyro"] if GYRO in trajectory else [])}),
         windows=_windows_inside(path, options.windows_s, time) or push_windows(run.push),
         scenario=scenario,
     )
@@ -266,6 +268,8 @@ def _measured(
         measured["y2_rad"] = signals["gimbal"]
     elif "gimbal1" in signals:
         measured["y2_rad"] = (signals["gimbal1"] - signals["gimbal2"]) / 2.0
+    if "gyro" in signals:
+        measured[GYRO] = signals["gyro"]
     if "command" in signals:
         measured[HELD] = signals["command"]
     if "torque" in signals:  # of f2 in (4) it is u times a momentum, at upright gimbals
@@ -527,7 +531,8 @@ def _join(segments: Sequence[Segment]) -> dict[str, np.ndarray]:
     """Join all segments, with every column of a log."""
     time = np.concatenate([segment.time for segment in segments])
     columns = {"time_s": time - time[0] if abs(time[0]) > 1e6 else time}
-    absent = {"y1_rad": 0.0, "y2_rad": 0.0, HELD: 0.0, "acceleration_rad_s2": math.nan, REFERENCE: math.nan}
+    absent = {"y1_rad": 0.0, "y2_rad": 0.0, HELD: 0.0}
+    absent |= dict.fromkeys(("acceleration_rad_s2", GYRO, REFERENCE), math.nan)
     for name, value in absent.items():
         columns[name] = np.concatenate([some.values.get(name, np.full(len(some.time), value)) for some in segments])
     return columns

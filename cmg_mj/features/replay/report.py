@@ -57,6 +57,8 @@ def log_figures(replayed: ReplayResult) -> dict[str, SummaryValue]:
     figures["noise"] = {"tilt_rad": noise.tilt}
     if "acceleration" in log.has:
         figures["noise"] |= {"acceleration_rad_s2": noise.acceleration, "correlation": noise.correlation}
+    if "gyro" in log.has:
+        figures["noise"]["gyro_rad_s_rthz"] = noise.gyro
     figures |= noise_figures(log, noise)
     if replayed.alignment:
         figures["reference"] = replayed.alignment._asdict()

@@ -25,7 +25,7 @@ from cmg_mj.inputs.overrides import assign, value_of
 from cmg_mj.laws import LAW_CLASSES
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.plant.plant import Plant, load_scenario_plant
-from cmg_mj.results.baselines import RATES
+from cmg_mj.results.baselines import NO_OBSERVERS
 from cmg_mj.runs.batch import UNUSED, can_vary_in_batch
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.schema import Scenario, parse_scenario
@@ -228,8 +228,8 @@ class SweepStudy:
             if count is not None and not (isinstance(count, (int, np.integer)) and count >= 1):
                 raise InputError(f"{name} = {count}: must be a whole number, 1 or more")
         for name, times in Counter(map(str, self.observers)).items():
-            if ":" not in name and name not in (*OBSERVERS, *RATES):
-                known = nearest(name, [*OBSERVERS, *RATES])
+            if ":" not in name and name not in (*OBSERVERS, *NO_OBSERVERS):
+                known = nearest(name, [*OBSERVERS, *NO_OBSERVERS])
                 raise InputError(f"observers: {name!r}: no such observer; {known}, or your own as package.module:Class")
             if times > 1:
                 raise InputError(f"observers: {name!r} is there twice")
@@ -309,7 +309,7 @@ class SweepStudy:
     @property
     def baselines(self) -> tuple[str, ...]:
         """Names in `observers` that close no loop."""
-        return tuple(name for name in self.observers if name in RATES)
+        return tuple(name for name in self.observers if name in NO_OBSERVERS)
 
     @property
     def references(self) -> tuple[str, ...]:
@@ -319,7 +319,7 @@ class SweepStudy:
     @property
     def contenders(self) -> list[int]:
         """Places in `observers` of those that are compared to find the best: baselines only among themselves."""
-        closing = [place for place, name in enumerate(self.observers) if name not in RATES]
+        closing = [place for place, name in enumerate(self.observers) if name not in NO_OBSERVERS]
         return closing or list(range(len(self.observers)))
 
     def scenario_with(self, observer: str) -> Scenario:
@@ -329,7 +329,7 @@ class SweepStudy:
             InputError: The law takes no rate, so that a baseline has no loop.
         """
         alone = self.scenario.model_copy(update={"open_loop_observers": []})
-        if observer not in RATES:
+        if observer not in NO_OBSERVERS:
             return alone.with_observer(observer)
         law = alone.controller.kind
         if not law_needs(LAW_CLASSES.find(law)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from cmg_mj.core.controller import Feedback
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.types import law_needs
+from cmg_mj.core.types import law_needs, reads_gyro
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study
 from cmg_mj.features.tuning.search import StopSearch, crossing
 from cmg_mj.laws import LAW_CLASSES
-from cmg_mj.observers import Observer, make_observer
+from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
 from cmg_mj.results.intervals import PairedVerdict
 from cmg_mj.results.summary_keys import Summary, SummaryValue, finite
 from cmg_mj.results.trajectory import Trajectory
@@ -89,7 +89,11 @@ def tuning_scenario(scenario: Scenario, noise_ug_rthz: float | None = None) -> S
     if feedback == "observer" and law_needs(LAW_CLASSES.find(scenario.controller.kind)):
         feedback = "fog"
     observer = ObserverSettings(kind="finite_difference")  # its angles are the measured ones
-    return plain_loop(scenario, duration, feedback).model_copy(update={"observer": observer, "sensors": sensors})
+    tuned = scenario.observer.kind
+    changes = {"observer": observer, "sensors": sensors}
+    if reads_gyro(OBSERVER_CLASSES.find(tuned)):  # so that the gyro is recorded
+        changes["open_loop_observers"] = [tuned]
+    return plain_loop(scenario, duration, feedback).model_copy(update=changes)
 
 
 def plain_loop(scenario: Scenario, duration_s: float, feedback: Feedback) -> Scenario:
@@ -268,7 +272,7 @@ def tune(
                 on_share((i + done) / len(densities))
 
         fitted, held_out = (recorded(*half) for half in halves(worlds, [density]))
-        noise = experiment.plant.parameters.noise(sensors.with_noise_density(density))
+        noise = replace(experiment.plant.parameters.noise(sensors.with_noise_density(density)), repeats=noise.repeats)
         try:
             levels.append(fit.level(partial(make_observer, kind, dt, model, noise), fitted, held_out, share, density))
             with suppress(StopSearch):

@@ -25,6 +25,7 @@ COLOURS: dict[str, Colour] = {
     "kalman": (129, 68, 110),
     "gyro_free": (69, 131, 155),
     "free_pivot": (172, 99, 90),
+    "mems_fused": (72, 42, 132),
     "finite_difference": (176, 25, 9),
     "super_twisting": (43, 60, 254),
     "linear_high_gain": (177, 178, 253),
@@ -40,7 +41,6 @@ BASELINE_COLOURS: dict[str, Colour] = {
     "zero": (120, 120, 120),
     "mems_as_bought": (156, 154, 46),
     "mems_gyro": (6, 109, 61),
-    "mems_fused": (12, 191, 110),
     "floor_y1": (133, 179, 209),
     "floor_accel": (143, 83, 167),
 }

@@ -14,6 +14,7 @@ import pytest
 
 from cmg_mj import load_scenario, prepare
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import export
 
 pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
@@ -50,6 +51,7 @@ class Compiled:
         files = export(loop, folder, precision=precision)
         self.name = files[0].stem
         self.width = 3 + len(loop.extra_signals[0])
+        self.gyro_at = 4 + len(loop.gimbal_angle.zeros) if reads_gyro(loop.observer) else None
         self.header, self.source, self.example, _ = files
         read_by_every_compiler(self.source, self.example)
         self.library = folder / "export.so"
@@ -60,7 +62,7 @@ class Compiled:
         self._controller = np.full(1024, np.nan, self.type)  # memory that nobody has cleared
 
     def run(self, samples: np.ndarray) -> np.ndarray:
-        """Call `update` with raw samples, (n, 4 + gimbals); return the estimates and u, (n, 4 + extra signals)."""
+        """Call `update` with raw samples, (n, 4 + gimbals + gyros); return estimates and u, (n, 4 + extra signals)."""
         statuses, results = self.statuses(samples)
         assert not statuses.any()
         return results
@@ -75,10 +77,14 @@ class Compiled:
         samples = np.ascontiguousarray(samples, self.type)
         results = np.full((len(samples), self.width + 1), np.nan, self.type)
         statuses = [
-            self._call("update", self._controller, sample[:4], sample[4:], result, result[-1:])
+            self._call("update", self._controller, sample[:4], sample[4:], *self._gyro(sample), result, result[-1:])
             for sample, result in zip(samples, results, strict=True)
         ]
         return np.array(statuses), results.astype(float)
+
+    def _gyro(self, sample: np.ndarray) -> list[Any]:
+        kind = {np.float64: ctypes.c_double, np.float32: ctypes.c_float}[self.type]
+        return [] if self.gyro_at is None else [kind(sample[self.gyro_at])]
 
     def numbers(self, count: int) -> np.ndarray:
         """The controller's first numbers: the observer's state, x_e, u. Writing to them changes the controller."""
@@ -93,7 +99,7 @@ class Recording:
     """A closed loop of push_recovery over 15 s, or until it fell.
 
     Attributes:
-        samples: Raw accelerations and encoders, (n, 4 + gimbals).
+        samples: Raw accelerations, encoders and, if it is read, the gyro, (n, 4 + gimbals + gyros).
         results: The controller's estimates and u, (n, 4 + extra signals).
         rate: The true tilt rate [rad/s], (n,).
     """
@@ -104,9 +110,9 @@ class Recording:
         samples, results, rates = [], [], []
         decide = controller.decide
 
-        def decide_and_record(step: int, forces: Any, encoders: Any, fog: float, rate: float) -> Any:
-            tick = decide(step, forces, encoders, fog, rate)
-            samples.append([*forces, *encoders])
+        def decide_and_record(step: int, forces: Any, encoders: Any, fog: float, rate: float, gyro: float) -> Any:
+            tick = decide(step, forces, encoders, fog, rate, gyro)
+            samples.append([*forces, *encoders, *([gyro] if reads_gyro(controller.observer) else [])])
             results.append([*tick.estimates[0], tick.u])
             rates.append(rate)
             return tick

@@ -61,8 +61,9 @@ def act(env: ScissoredPairEnv, seed: int, **options: Any) -> tuple[list[Tick], l
         ("push_recovery", [*SHORT, "push.0.torque_n_m=40.0"], 0, 0),
         ("bias_estimation", ["duration_s=2.0"], 0, 0),
         ("push_recovery", [*SHORT, *REAL], 1, 2),
+        ("push_recovery", [*SHORT, "observer.kind=mems_fused"], 1, 2),
     ],
-    ids=["push", "another world", "uneven", "fall", "bias", "a real rig"],
+    ids=["push", "another world", "uneven", "fall", "bias", "a real rig", "a cheap gyro"],
 )
 def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: list[str], seed: int, world: int) -> None:
     """Bit for bit: what is measured, estimated, commanded, and where the rig is."""

@@ -109,3 +109,10 @@ def test_another_law_with_all_else(integrator: str) -> None:
 def test_another_rate_fed_back(feedback: str, scenario: str, integrator: str) -> None:
     fog = ("sensors.fog.rate_hz=1000", "sensors.fog.latency_s=0.002", "sensors.fog.bias_deg_h=20")
     check("kalman", f"controller.feedback={feedback}", f"plant.integrator={integrator}", *fog, scenario=scenario)
+
+
+def test_a_calibrated_gyro_and_two_axes_with_gyros_of_their_own() -> None:
+    calibrated = "sensors.mems_gyro.reading=calibrated"
+    check("mems_fused", calibrated)
+    check("mems_fused", calibrated, "controller.feedback=fog")
+    check("mems_fused", scenario="two_axes")

@@ -21,7 +21,7 @@ TILT = "plant.initial_tilt_deg"
 
 @pytest.mark.slow
 def test_a_baselines_trials_are_those_beside_the_true_rate() -> None:
-    baselines = ("zero", "mems_as_bought", "mems_fused")
+    baselines = ("zero", "mems_as_bought", "mems_gyro")
     rows = all_trials(make_study({BIAS: "0,0.5"}, (*baselines, "linear"), settings=SETTINGS)).to_pylist()
     setup = prepare(load_scenario("push_recovery", [*SETTINGS, "controller.feedback=truth", f"{BIAS}=0.5"], "kalman"))
     run: Result = setup.run_many(2, keep_trajectory=False)

@@ -68,3 +68,8 @@ def test_noise_is_that_of_the_level() -> None:
     )
     spread = [np.diff(r.trajectory["y1_rad"][:300], axis=0).std() for r in (quiet, loud)]
     assert 4.0 < spread[1] / spread[0] < 9.0
+
+
+def test_the_gyro_is_recorded_for_an_observer_that_needs_it() -> None:
+    scenarios = [tuning_scenario(load_scenario("observer_tuning", (), kind)) for kind in ("mems_fused", "ltv")]
+    assert [scenario.open_loop_observers for scenario in scenarios] == [["mems_fused"], []]

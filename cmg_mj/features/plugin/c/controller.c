@@ -39,6 +39,7 @@ int controller_decide(
 
     controller->measure(inputs->forces, inputs->encoders, result->y);
     result->y[2] -= inputs->coriolis;
+    result->y[3] = inputs->gyro;
     if (memory[places->decisions] == 0.0) {
         controller->observer_init(memory + places->observer, y);
         controller->law_init(law, y);

@@ -18,13 +18,14 @@ typedef struct {
     double trim_gain; /* [s] */
     int angles_are_estimated;
     int feedback; /* one of the above */
+    int reads_gyro; /* whether the observer needs the cheap gyro */
     double rate_limit; /* [rad/s] */
     int has_backlash;
     double half_gap; /* [rad] */
     double period;   /* from one decision to the next [s] */
     void (*measure)(const double *forces, const double *encoders, double y[3]);
-    void (*observer_init)(double *state, const double y[3]);
-    void (*observer_step)(double *state, const double y[3], double u, double *estimate);
+    void (*observer_init)(double *state, const double y[4]);
+    void (*observer_step)(double *state, const double y[4], double u, double *estimate);
     void (*law_init)(double *state, const double y[3]);
     void (*law_step)(double *state, const double y[3], const double *x, double held, double *u);
 } controller_type;
@@ -37,7 +38,7 @@ typedef struct {
 } controller_places;
 
 typedef struct {
-    double y[3]; /* tilt, gimbal angle, acceleration of the tilt */
+    double y[4]; /* tilt, gimbal angle, acceleration of the tilt; the cheap gyro's reading */
     double u;    /* command [rad/s] */
     double rate; /* tilt rate that was fed back [rad/s] */
     double x_e;  /* integrator that went into it [rad s] */
@@ -52,6 +53,7 @@ typedef struct {
     const double *forces, *encoders;
     double rate;     /* of the gyro, or the true one, if that is fed back [rad/s] */
     double coriolis; /* part of the measured acceleration that is none [rad/s^2] */
+    double gyro;     /* reading of the cheap one, if it is read [rad/s] */
 } controller_inputs;
 
 /* Decide on one sample; 0 if the observer or the law gave no finite number. */

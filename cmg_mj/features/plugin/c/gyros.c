@@ -26,16 +26,18 @@ void fog_sample(
     deliver(&fog->delivery, &places->delivery, memory, instant, &reading);
 }
 
-int turn_gyro_place(int at, turn_gyro_places *places)
+int mems_gyro_place(int at, mems_gyro_places *places)
 {
     places->noise = at;
     places->offset = at + NOISE_WORDS;
-    places->wander = places->offset + 1;
+    places->drift = places->offset + 1;
+    places->samples = places->drift + 1;
+    places->wander = places->samples + 1;
     return places->wander + CORNERS;
 }
 
 /* Error of the next sample: white noise, then 1/f noise. */
-static double next_error(const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory)
+static double next_error(const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory)
 {
     double normals[1 + CORNERS], sum = 0.0, *processes = memory + places->wander;
     noise_normals(memory + places->noise, normals, 1 + CORNERS);
@@ -46,27 +48,37 @@ static double next_error(const turn_gyro_type *gyro, const turn_gyro_places *pla
     return gyro->sigma * normals[0] + sum;
 }
 
-/* Begin, with a mean at rest that is taken off. */
-static void calibrate(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world)
+/* Begin, with a mean at rest that is taken off, or with the offset and the drift of a part as bought. */
+static void start(
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world)
 {
     double normals[1 + CORNERS], mean = 0.0;
     noise_start(memory + places->noise, seed, world, gyro->stream);
     noise_normals(memory + places->noise, normals, 1 + CORNERS);
     for (int i = 0; i < CORNERS; ++i) memory[places->wander + i] = gyro->flicker_sigma * normals[1 + i];
-    for (int start = 0; start < gyro->resting; start += gyro->piece) {
+    for (int from = 0; from < gyro->resting; from += gyro->piece) {
         double sum = next_error(gyro, places, memory);
-        for (int i = 1; i < gyro->piece && start + i < gyro->resting; ++i) sum += next_error(gyro, places, memory);
+        for (int i = 1; i < gyro->piece && from + i < gyro->resting; ++i) sum += next_error(gyro, places, memory);
         mean = mean + sum / gyro->resting;
     }
+    memory[places->samples] = memory[places->drift] = 0.0;
     memory[places->offset] = gyro->bias - mean;
+    if (gyro->is_as_bought) {
+        double part[NOISE_WORDS] = {0}, signs[2];
+        noise_start(part, seed, world, gyro->part_stream);
+        noise_normals(part, signs, 2);
+        memory[places->offset] = gyro->bias + copysign(gyro->offset, signs[0]);
+        memory[places->drift] = copysign(gyro->drift, signs[1]);
+    }
 }
 
-double turn_gyro_read(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world, double rate)
+double mems_gyro_read(
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world, double rate)
 {
-    if (!noise_is_started(memory + places->noise)) calibrate(gyro, places, memory, seed, world);
-    const double error = next_error(gyro, places, memory) + memory[places->offset];
+    if (!noise_is_started(memory + places->noise)) start(gyro, places, memory, seed, world);
+    const double offset = memory[places->offset] + memory[places->drift] * memory[places->samples];
+    const double error = next_error(gyro, places, memory) + offset;
+    memory[places->samples] += 1.0;
     const double x = clip(gyro->scale * rate + error, -gyro->limit, gyro->limit);
     return gyro->step != 0.0 ? rint(x / gyro->step) * gyro->step : x;
 }

@@ -1,5 +1,5 @@
 /* Gyros, bit for bit those of cmg_mj/sensors: the fibre-optic one that a law may be fed back, and the cheap one about
- * the vertical, against whose rate the gimbals of several axes are turned. */
+ * the vertical, against whose rate the gimbals of several axes are turned, or about a tilt axis. */
 #ifndef CMG_MJ_GYROS_H
 #define CMG_MJ_GYROS_H
 
@@ -19,23 +19,25 @@ typedef struct {
 } fog_places;
 
 typedef struct {
-    int stream;
+    int stream, part_stream;
     int resting; /* samples of the mean at rest */
     int piece;   /* of them at a time */
     double sigma, limit, step, scale, bias; /* [rad/s]; scale [1] */
+    int is_as_bought;
+    double offset, drift; /* of a part as bought: sizes, the drift's in a sample [rad/s] */
     double flicker_sigma, decay[CORNERS], spread[CORNERS];
-} turn_gyro_type;
+} mems_gyro_type;
 
 typedef struct {
-    int noise, offset, wander;
-} turn_gyro_places;
+    int noise, offset, drift, samples, wander;
+} mems_gyro_places;
 
 int fog_place(const fog_type *fog, int at, fog_places *places);
 void fog_sample(
     const fog_type *fog, const fog_places *places, double *memory, double seed, double world, double instant, double rate);
 
-int turn_gyro_place(int at, turn_gyro_places *places);
-double turn_gyro_read(
-    const turn_gyro_type *gyro, const turn_gyro_places *places, double *memory, double seed, double world, double rate);
+int mems_gyro_place(int at, mems_gyro_places *places);
+double mems_gyro_read(
+    const mems_gyro_type *gyro, const mems_gyro_places *places, double *memory, double seed, double world, double rate);
 
 #endif

@@ -148,7 +148,7 @@ static int read_inputs(const mjModel *m, const mjData *d, double *state)
         const axis_type *axis = rig.axis[i];
         at = axis_place(axis, at, &places);
         is_finite &= take(state + places.forces, FORCES + axis->gimbals, d->sensordata, n, state + places.inputs);
-        if (axis->controller->feedback == FEEDBACK_FOG)
+        if (reads_gyro(axis))
             is_finite &= take(state + places.gyro_from, 1, d->sensordata, n, state + places.gyro);
         if (axis->controller->feedback == FEEDBACK_TRUTH)
             is_finite &= take(state + places.rates_from, axis->dofs, d->qvel, (int)m->nv, state + places.rates);

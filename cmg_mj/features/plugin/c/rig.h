@@ -24,6 +24,7 @@ typedef struct {
     double raw_rate; /* samples a second inside the accelerometers */
     sensor_settings settings;
     fog_type fog;
+    mems_gyro_type mems_gyro;
     const char *joint;        /* of the tilt; free, or a hinge */
     int dofs;                 /* of it that the tilt rate is made of */
     double shares[MOST_DOFS]; /* of them in it */
@@ -32,7 +33,7 @@ typedef struct {
 
 /* Coupling of the axes in a turn about the vertical: see YawCoupling in cmg_mj/stages/turning.py. */
 typedef struct {
-    turn_gyro_type gyro;
+    mems_gyro_type gyro;
     double flywheels[MOST_AXES][MOST_AXES], inertia[MOST_AXES][MOST_AXES], coriolis[MOST_AXES][MOST_AXES];
 } turning_type;
 

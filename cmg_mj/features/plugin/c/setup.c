@@ -112,7 +112,7 @@ static int find_axis(const search *in, const axis_type *axis, const axis_places 
     if (!find_sensor(in, axis->prefix, "accelerometer_outer", mjSENS_ACCELEROMETER, &outer)) return 0;
     const double forces[FORCES] = {inner, inner + 2, outer, outer + 2};
     memcpy(state + places->forces, forces, sizeof forces);
-    if (axis->controller->feedback == FEEDBACK_FOG) {
+    if (reads_gyro(axis)) {
         double *from = state + places->gyro_from;
         if (!find_sensor(in, axis->prefix, "fog", mjSENS_GYRO, from)) return 0;
         *from += 1; /* its y axis */

@@ -5,6 +5,11 @@
 #include <math.h>
 #include <string.h>
 
+int reads_gyro(const axis_type *axis)
+{
+    return axis->controller->feedback == FEEDBACK_FOG || axis->controller->reads_gyro;
+}
+
 int axis_place(const axis_type *axis, int at, axis_places *places)
 {
     const int gimbals = axis->gimbals;
@@ -18,11 +23,12 @@ int axis_place(const axis_type *axis, int at, axis_places *places)
     places->rate = places->held + 1;
     places->inputs = places->rate + 1;
     at = places->inputs + FORCES + gimbals;
-    if (axis->controller->feedback == FEEDBACK_FOG) {
+    if (reads_gyro(axis)) {
         places->gyro_from = at++;
         places->gyro = at++;
-        at = fog_place(&axis->fog, at, &places->fog);
     }
+    if (axis->controller->feedback == FEEDBACK_FOG) at = fog_place(&axis->fog, at, &places->fog);
+    if (axis->controller->reads_gyro) at = mems_gyro_place(at, &places->mems_gyro);
     if (axis->controller->feedback == FEEDBACK_TRUTH) {
         places->rates_from = at;
         places->rates = at + axis->dofs;
@@ -41,7 +47,7 @@ int turning_place(const turning_type *turning, int at, turning_places *places)
     if (!turning) return at;
     places->rate_from = at++;
     places->rate = at++;
-    return turn_gyro_place(at, &places->gyro);
+    return mems_gyro_place(at, &places->gyro);
 }
 
 int element(double number, int n)
@@ -75,7 +81,7 @@ double state_constants(const rig_type *type, const double *state)
         const axis_type *axis = type->axis[i];
         at = axis_place(axis, at, &places);
         sum += sum_of(state + places.forces, places.held - places.forces);
-        if (axis->controller->feedback == FEEDBACK_FOG) sum += state[places.gyro_from];
+        if (reads_gyro(axis)) sum += state[places.gyro_from];
         if (axis->controller->feedback == FEEDBACK_TRUTH) sum += sum_of(state + places.rates_from, axis->dofs);
     }
     if (type->turning) {
@@ -150,7 +156,11 @@ static int axis_decide(
     delivery_read(&axis->pair.delivery, &places->pair.delivery, state, instant, forces);
     delivery_read(&axis->encoder.delivery, &places->encoder, state, instant, angles);
     const double rate = other_rate(axis, places, state, instant);
-    const controller_inputs inputs = {forces, angles, rate, state[places->coriolis]};
+    double gyro = 0.0;
+    if (axis->controller->reads_gyro)
+        gyro = mems_gyro_read(
+            &axis->mems_gyro, &places->mems_gyro, state, state[SEED], state[WORLD], state[places->gyro]);
+    const controller_inputs inputs = {forces, angles, rate, state[places->coriolis], gyro};
     return controller_decide(axis->controller, &places->controller, state, &inputs, result);
 }
 
@@ -181,7 +191,7 @@ static void compensate(
     double turned[MOST_AXES], rates[MOST_AXES];
     turning_places own;
     (void)turning_place(turning, at, &own);
-    const double w = turn_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
+    const double w = mems_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
     for (int i = 0; i < n; ++i) {
         turned[i] = sin(results[i].y[1]);
         rates[i] = results[i].rate;
@@ -201,7 +211,7 @@ static void compensate(
 static void axis_show(const axis_type *axis, const axis_places *places, double *state, const decision *result)
 {
     double *shown = state + places->shown;
-    memcpy(shown, result->y, sizeof result->y);
+    memcpy(shown, result->y, SHOWN_U * sizeof *shown);
     shown[SHOWN_U] = result->u;
     shown[SHOWN_X_E] = result->x_e;
     memcpy(shown + SHOWN_ESTIMATE, result->estimate, (size_t)axis->controller->estimates * sizeof *shown);

@@ -30,13 +30,14 @@ typedef struct {
     int settings;            /* force sigma, force step, angle step */
     int held, rate;          /* rate of the gimbals until this instant, and from it on [rad/s] */
     int inputs;              /* of this instant: ideal forces, then ideal gimbal angles */
-    int gyro_from, gyro;     /* place in sensordata, and input, of a gyro that is fed back [rad/s] */
+    int gyro_from, gyro;     /* place in sensordata, and input, of a gyro that is fed back or observed [rad/s] */
     int rates_from, rates;   /* places in qvel, and inputs, of a true rate that is fed back */
     int coriolis;            /* of the decision before, on a rig that turns [rad/s^2] */
     int shown;               /* y1, y2, acceleration, u, x_e, then the estimate, at the last decision */
     pair_places pair;
     delivery_places encoder;
     fog_places fog;
+    mems_gyro_places mems_gyro;
     controller_places controller;
 } axis_places;
 
@@ -48,8 +49,11 @@ enum { ESTIMATE, COMMAND, TILT, GIMBAL, ACCELERATION, INTEGRATOR, SAMPLE, QUANTI
 /* Places of the rig as a whole, behind those of the axes, if its turns are compensated. */
 typedef struct {
     int rate_from, rate; /* place in sensordata, and input, of the rate about the vertical [rad/s] */
-    turn_gyro_places gyro;
+    mems_gyro_places gyro;
 } turning_places;
+
+/* Whether a gyro along the tilt axis is read. */
+int reads_gyro(const axis_type *axis);
 
 /* Each returns the first place behind the block. */
 int axis_place(const axis_type *axis, int at, axis_places *places);
