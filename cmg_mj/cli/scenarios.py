@@ -154,7 +154,7 @@ def compare(
         if setting.startswith("observer.") and scenario.observer.kind not in names:
             raise InputError(
                 f"--set {setting}: is a setting of {scenario.observer.kind}, which is not among "
-                f"--observers {','.join(names)}; the others are compared with their default parameters"
+                f"--observers {','.join(names)}, of which it sets none: name one by --set observer.kind={names[0]}"
             )
     experiments = comparison.prepare_comparison(scenario, names)
     rerun = comparison.repeatable(scenario, experiments, worlds)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, nearest
 
 
 class _Angles(NamedTuple):
@@ -107,8 +107,15 @@ def needs(observer: Observer | type) -> tuple[str, ...]:
     """Return the `NEEDS` of an observer, or of its class: its required inputs beside y1.
 
     One that does not say counts as needing the model and the gimbals, as the papers' observers do.
+
+    Raises:
+        InputError: A name is none of `NEEDS`.
     """
-    return getattr(observer, "needs", ("model", "gimbals"))
+    named = tuple(getattr(observer, "needs", ("model", "gimbals")))
+    for name in named:
+        if name not in NEEDS:
+            raise InputError(f"an observer's needs = {named}: {name!r}: {nearest(name, NEEDS)}")
+    return named
 
 
 def reads_gyro(*observers: Observer | type) -> bool:

@@ -59,6 +59,9 @@ ForgetsWorlds = estimating("ForgetsWorlds", lambda k, y, rate: (y.y1, 0.0, y.y2)
 FailsLater = estimating("FailsLater", lambda k, y, rate: 1 / 0 if k == 30 else (y.y1, rate, y.y2))
 GivesNan = estimating("GivesNan", lambda k, y, rate: (y.y1, rate * (math.nan if k >= 30 else 1.0), y.y2))
 IsMasked = estimating("IsMasked", lambda k, y, rate: (y.y1, np.ma.masked, y.y2))
+WidensLater = estimating("WidensLater", lambda k, y, rate: (y.y1, np.array([rate]) if k >= 30 else rate, y.y2))
+IsNoneLater = estimating("IsNoneLater", lambda k, y, rate: (y.y1, None if k >= 30 else rate, y.y2))
+IsComplexLater = estimating("IsComplexLater", lambda k, y, rate: (y.y1, rate * (1j if k >= 30 else 1.0), y.y2))
 IsMaskedLater = estimating("IsMaskedLater", lambda k, y, rate: (y.y1, np.ma.masked if k >= 30 else rate, y.y2))
 
 
@@ -94,6 +97,7 @@ def commanding(name: str, command: Callable[[int, Any], Any]) -> type:
 LawReturnsAList = commanding("LawReturnsAList", lambda k, demand: [demand])
 LawForgetsWorlds = commanding("LawForgetsWorlds", lambda k, demand: 0.0)
 LawFailsLater = commanding("LawFailsLater", lambda k, demand: 1 / 0 if k == 30 else demand)
+LawWidensLater = commanding("LawWidensLater", lambda k, demand: [demand] if k >= 30 else demand)
 LawGivesInfinity = commanding("LawGivesInfinity", lambda k, demand: demand * 0.0 + (math.inf if k >= 30 else 0.0))
 
 
@@ -180,7 +184,11 @@ def test_what_has_a_wrong_shape_ends_the_run_at_its_first_tick(part: type, world
     [
         (FailsLater, "ZeroDivisionError: division by zero"),
         (GivesNan, "observer GivesNan returned nan for x2"),
-        (IsMaskedLater, "observer IsMaskedLater returned -- for x2"),
+        (IsMaskedLater, "TypeError: x2 is masked"),
+        (WidensLater, "TypeError: x2 has shape (1,) of float64, not ()"),
+        (IsNoneLater, "TypeError: x2 has shape () of object, not ()"),
+        (IsComplexLater, "TypeError: x2 has shape () of complex128, not ()"),
+        (LawWidensLater, "TypeError: u has shape (1,) of float64, not ()"),
         (LawFailsLater, "ZeroDivisionError: division by zero"),
         (LawGivesInfinity, "law LawGivesInfinity returned inf for u"),
     ],

@@ -46,7 +46,7 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     yield from _pivot(result)
     margin = result.push_limits.push_margin.median_impulse
     reduced = (
-        f"by its reduced model E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
+        f"by its reduced model the largest push's impulse is E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
         f"{result.push_limits.fraction_of_limit:.0%} of any controller's"
     )
     yield f"  {result.observer}: {_simulated(result.simulated, _advice(result))}{reduced}"
@@ -97,9 +97,7 @@ def _simulated(simulated: SimulatedPush | None, advice: str) -> str:
             reason = f"not even {MIN_SHARE:.0%} of any controller's push"
         return f"stands in MuJoCo only unpushed ({reason}); "
     others = f"and all of {OTHER_WORLDS} others"
-    more = (
-        others if simulated.complete else f"{MAX_SEARCH_S:g} s did not suffice for one that {OTHER_WORLDS} others stand"
-    )
+    more = others if simulated.complete else f"{MAX_SEARCH_S:g} s were too short to try it in {OTHER_WORLDS} others"
     return (
         f"stands a push of {simulated.impulse / PUSH_S:.3g} N m for {PUSH_S:g} s either way (MuJoCo, all of {WORLDS} "
         f"worlds, less a tenth; {more}); "

@@ -107,7 +107,8 @@ def parse_axis(option: str, variation: Variation, where: str) -> VariedField:
     if "" in fields:
         raise InputError(f"{where}: write FIELD=VALUES, for example plant.equilibrium_bias_deg=-1.5:1.5:13")
     values = _plain(variation)
-    if isinstance(values, str) and ":" in values and not values.lstrip().startswith(("[", '"')):
+    names = fields[0].endswith(".kind")  # module:Class is no range
+    if isinstance(values, str) and ":" in values and not names and not values.lstrip().startswith(("[", '"')):
         return _parse_range(fields, values.strip(), where)
     if isinstance(values, str):
         values = _parse_list(values, where)

@@ -172,7 +172,7 @@ def pendulum(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     ("simulated", "text"),
     [
         (SimulatedPush(10, 0.3), "gyro_free: stands a push of 3 N m for 0.1 s either way (MuJoCo, all of 10 worlds, "),
-        (SimulatedPush(10, 0.3, complete=False), "60 s did not suffice for one that 20 others stand"),
+        (SimulatedPush(10, 0.3, complete=False), "60 s were too short to try it in 20 others"),
         (SimulatedPush(10, 0.0), "gyro_free: stands in MuJoCo only unpushed"),
         (SimulatedPush(28, worlds=30), "gyro_free: does not stand: in MuJoCo 2 of 30 worlds fall"),
         (SimulatedPush(None, complete=False), "in MuJoCo nothing found within 60 s"),
