@@ -45,8 +45,8 @@ _OPTIONS = (
         "--columns",
         multiple=True,
         metavar="ROLE=HEADING,...",
-        help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
-        "outer_z, acceleration, gimbal (or gimbal1, gimbal2) and command, or torque, gyro. Not for a run's own recording.",
+        help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, outer_z, "
+        "acceleration, gyro, gimbal (or gimbal1, gimbal2) and command, or torque. Not for a run's own recording.",
     ),
     click.option(
         "--units",
