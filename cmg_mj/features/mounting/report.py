@@ -46,8 +46,8 @@ def mount_report_lines(result: MountResult) -> Iterator[str]:
     yield from _pivot(result)
     margin = result.push_limits.push_margin.median_impulse
     reduced = (
-        f"by its reduced model the largest push's impulse is E = {margin:.3g} N m s, a push of {margin / PUSH_S:.3g} N m, "
-        f"{result.push_limits.fraction_of_limit:.0%} of any controller's"
+        f"by its reduced model the largest push's impulse is E = {margin:.3g} N m s, "
+        f"a push of {margin / PUSH_S:.3g} N m, {result.push_limits.fraction_of_limit:.0%} of any controller's"
     )
     yield f"  {result.observer}: {_simulated(result.simulated, _advice(result))}{reduced}"
     low = math.degrees(result.push_limits.limit.tilt) < LOW_LIMIT_DEG
