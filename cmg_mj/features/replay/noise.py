@@ -319,10 +319,11 @@ def gyro_noise(log: Log) -> tuple[float, str]:
         return math.radians(MemsGyro().noise_density_deg_s_rthz), "the datasheet's of a cheap one: the log is short"
     power = np.concatenate([np.abs(_spectra(residual[None])[0]) ** 2 for residual in residuals])
     floor = _floor(1.0, power, smallest_step(log[GYRO]), float(np.std(log[GYRO])))
-    if isinstance(floor, WhiteNoise):
-        return floor.sigma * math.sqrt(2.0 * log.dt), "the log's white floor"
-    upper = math.sqrt(float(power[_steady(power)][:, _columns(FLOORS[-1][0])].mean()))
-    return upper * math.sqrt(2.0 * log.dt), f"that of the log's upper band, for {floor}"
+    if isinstance(floor, str):
+        upper = math.sqrt(float(power[_steady(power)][:, _columns(FLOORS[-1][0])].mean()))
+        return upper * math.sqrt(2.0 * log.dt), f"that of the log's upper band, for {floor}"
+    origin = f"that of the log's upper band, for {floor.doubt}" if floor.doubt else "the log's white floor"
+    return floor.sigma * math.sqrt(2.0 * log.dt), origin
 
 
 def _without_gyro(log: Log, noises: Mapping[str, float]) -> MeasurementNoise:
