@@ -46,7 +46,7 @@ _OPTIONS = (
         multiple=True,
         metavar="ROLE=HEADING,...",
         help="Roles of the columns: time, tilt, rate (the reference), ax, az, inner_x, inner_z, outer_x, "
-        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command. Not for a run's own recording.",
+        "outer_z, acceleration, gimbal (or gimbal1, gimbal2), command, torque. Not for a run's own recording.",
     ),
     click.option(
         "--units",

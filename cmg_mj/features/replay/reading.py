@@ -20,6 +20,7 @@ from cmg_mj.features.replay.log import (
     EVEN,
     ONE_ACCELEROMETER,
     REFERENCE,
+    Channels,
     Column,
     Log,
     ReadOptions,
@@ -121,6 +122,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
+    if "torque" in columns:
+        notes.append(f"the torque {columns['torque'].name!r} is not used: no observer takes one")
     clipped = _clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, options.rig.accelerometer, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
@@ -154,6 +157,31 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         row_period_s=period,
         white_noise=white_noise_of(segments, period, dt),
     )
+
+
+def read_channels(path: Path | str, options: ReadOptions) -> Channels:
+    """Read a log's columns as they are, evenly sampled, in the longest part without a gap.
+
+    Args:
+        path: A CSV with a heading, or a Parquet file.
+        options: The columns of the file; of its accelerometers only columns and units count.
+
+    Raises:
+        InputError: Something is wrong with the file or the options.
+    """
+    path, notes = Path(path), list[str]()
+    columns = columns_of(options)
+    time, signals = _times(path, read_table(path, columns, options), options)
+    if "tilt" in signals:
+        signals["tilt"] = _unwrapped(signals["tilt"], notes)
+    paced = signals.get("tilt", next(values for values in signals.values()))
+    _, dt, segments = _sample(path, time, {**signals, "y1_rad": paced}, options, MIN_RATE_HZ, notes)
+    longest = max(segments, key=lambda segment: len(segment.time))
+    if len(segments) > 1:
+        start, end = longest.time[[0, -1]] - time[0]
+        notes.append(f"{start:.4g} to {end:.4g} s is used, the longest of {len(segments)} parts without a gap")
+    units = {role: column.unit or "s" for role, column in columns.items() if role in options.columns}
+    return Channels(path.stem, dt, longest.values, replace(options, units=units), notes)
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:

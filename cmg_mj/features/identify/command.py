@@ -1,0 +1,115 @@
+"""The command that identifies a rig from one log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from cmg_mj.cli.arguments import json_option, overwrites
+from cmg_mj.cli.terminal import note, shell_command, show, users_code
+from cmg_mj.core.errors import InputError
+from cmg_mj.features.replay.command import log_options
+
+if TYPE_CHECKING:
+    from cmg_mj.features.replay.log import ReadOptions
+    from cmg_mj.features.replay.rig import PlacedAccelerometer
+
+SIGNATURE = "# Written by cmg-mj identify, which may replace this file"
+
+
+@click.command()
+@click.argument("log", metavar="LOG")
+@log_options
+@click.option(
+    "--accelerometer",
+    "accelerometers",
+    multiple=True,
+    metavar="FIRST,SECOND[,UNIT]",
+    help="Headings of an accelerometer's two axes in the tilting plane, and their unit.  [default: the unit that both "
+    "headings end in, or else m_s2]",
+)
+@click.option(
+    "--below-hz",
+    type=click.FloatRange(0.1),
+    metavar="HZ",
+    help="Compare the channels below this frequency.  [default: 8, or less where noise hides the motion]",
+)
+@click.option("--judge", metavar="LOG", help="A second log, whose motion the result foretells.")
+@click.option(
+    "-o",
+    "--out",
+    default="rig.toml",
+    show_default=True,
+    metavar="FILE",
+    help="Rig file to write; the plot gets the same name with .png.",
+)
+@json_option()
+@users_code()
+def identify(
+    options: ReadOptions,
+    log: str,
+    accelerometers: tuple[str, ...],
+    below_hz: float | None,
+    judge: str | None,
+    out: str,
+    as_json: bool,
+) -> None:
+    """Find where the accelerometers of a rig sit, and what is wrong with its sensors, from one LOG.
+
+    \b
+      cmg-mj identify LOG.csv --columns time=t_ms,tilt=pot_rad,rate=gyro_dps \\
+        --accelerometer x1,y1 --accelerometer x2,y2 --judge OTHER.csv
+
+    Prints places, angles, scales, offsets, delays and noise with 95 % intervals, and writes a rig file, which replay
+    and tune-log take as --rig, with a plot of the residuals' spectra. The motion comes from an angle sensor (tilt), a
+    gyro (rate), or both. docs/identify.md has the details.
+    """  # noqa: D301  (click wants the character itself)
+    import tomli_w
+
+    from cmg_mj.features.identify import report
+    from cmg_mj.features.identify.geometry import fit_geometry
+    from cmg_mj.features.identify.signals import Signals, below
+    from cmg_mj.features.replay.reading import read_channels
+    from cmg_mj.results.folder import whole_file
+
+    path = Path(out)
+    if path.exists() and not overwrites() and not path.read_bytes().startswith(SIGNATURE.encode()):
+        raise InputError(f"--out {out}: is there, and not by this command: name another file, or give --overwrite")
+    if accelerometers:
+        options = replace(options, rig=options.rig.model_copy(update={"accelerometer": _unplaced(accelerometers)}))
+    channels = read_channels(log, options)
+    for remark in channels.notes:
+        note(f"{channels.name}: {remark}")
+    signals = Signals(channels, below_hz or below(channels))
+    found = fit_geometry(signals)
+    sizes = report.noises(found)
+    judged = report.judge(found, Signals(read_channels(judge, options), signals.below_hz)) if judge else {}
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(f"{SIGNATURE}\n\n{tomli_w.dumps(report.rig_fields(found, sizes))}", encoding="utf-8")
+        report.plot(path.with_suffix(".png"), found)
+    except OSError as error:
+        raise InputError(f"--out {out}: cannot be written: {error.strerror}") from error
+    show(report.figures(found, sizes, judged), report.tables(found, sizes, judged), as_json)
+    note(f"Written to {path}. Use it: {shell_command('cmg-mj', 'replay', log, '--rig', path)}")
+
+
+def _unplaced(texts: tuple[str, ...]) -> tuple[PlacedAccelerometer, ...]:
+    """Parse `--accelerometer x1,y1,g`."""
+    from cmg_mj.features.replay.log import unit_of_name
+    from cmg_mj.features.replay.rig import PlacedAccelerometer
+
+    found = []
+    for text in texts:
+        first, second, unit, *rest = [*map(str.strip, text.split(",")), "", ""]
+        if not second or rest != [""] * min(len(rest), 1):
+            raise InputError(
+                f"--accelerometer {text}: write the headings of its two axes, x1,y1, and perhaps a unit, x1,y1,g"
+            )
+        by_name = {unit_of_name("acceleration", name) for name in (first, second)}
+        unit = unit or (by_name.pop() if len(by_name) == 1 else None) or "m_s2"
+        found.append(PlacedAccelerometer(columns=(first, second), unit=unit, place_m=(0.0, 0.0)))
+    return tuple(found)
