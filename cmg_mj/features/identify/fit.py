@@ -80,18 +80,18 @@ def solve(parameters: Sequence[Parameter], residuals: Callable[[np.ndarray], np.
 
     before, known = np.array([p.before for p in parameters]), np.array([p.known for p in parameters])
     values, n, largest = np.array([p.start for p in parameters]), len(parameters), share
+
+    def weighed(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        return np.concatenate([(weights * residuals(values)).ravel(), (values - known) / before])
+
     covariance, inverse, sigmas = np.eye(n), np.eye(n), np.ones(1)
     for _ in range(PASSES):
         rest = residuals(values)
         sigmas = 1.4826 * np.median(np.abs(rest), axis=0) + 1e-12
         unusual = np.max(np.abs(rest / sigmas), axis=1, keepdims=True)
         weights = np.sqrt(share * np.minimum(1.0, USUAL / np.maximum(unusual, 1e-9))) / sigmas
-
-        def weighed(x: np.ndarray, weights: np.ndarray = weights) -> np.ndarray:
-            return np.concatenate([(weights * residuals(x)).ravel(), (x - known) / before])
-
-        scales = np.minimum(before, 1.0)
-        found = least_squares(weighed, values, method="lm", x_scale=scales, xtol=1e-6, ftol=1e-6)
+        options = {"method": "lm", "x_scale": np.minimum(before, 1.0), "xtol": 1e-6, "ftol": 1e-6}
+        found = least_squares(weighed, values, args=(weights,), **options)
         values, slopes = found.x, found.jac[:-n]
         inverse = np.linalg.inv(found.jac.T @ found.jac)
         stretches = zip(np.array_split(slopes, BLOCKS), np.array_split(found.fun[:-n], BLOCKS), strict=True)

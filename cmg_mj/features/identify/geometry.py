@@ -13,7 +13,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.identify.fit import Parameter, Solution, solve
-from cmg_mj.features.identify.signals import MAX_DELAY_S, Signals
+from cmg_mj.features.identify.signals import MAX_DELAY_S, PER_PERIOD, Signals
 from cmg_mj.features.replay.log import UNITS
 
 SCALE, OFFSET = 0.03, 0.6
@@ -64,9 +64,14 @@ class Motion:
         Args:
             signals: The log.
         """
+        from scipy.integrate import cumulative_trapezoid
+
         values = signals.channels.values
         self._signals, self._has_angle, self._has_rate = signals, "tilt" in values, "rate" in values
-        self._angle = values["tilt"] if self._has_angle else signals.channels.dt * np.cumsum(values["rate"])
+        if self._has_angle:
+            self._angle = values["tilt"]
+        else:
+            self._angle = cumulative_trapezoid(values["rate"], dx=signals.channels.dt, initial=0.0)
         angle = signals.curve(self._angle)
         self._shown, self._square = (lambda t, order=0: angle(t, order + 1)), signals.curve(angle(signals.grid, 1) ** 2)
         if self._has_rate:
@@ -80,7 +85,8 @@ class Motion:
         found = [] if not self._has_angle else [Parameter("tilt scale", "", 1.0, SCALE, 1.0)]
         if not self._has_rate:
             return found
-        offset = 0.0 if self.slope is None else float(np.mean(self._shown(self._signals.time) - self.slope))
+        slope = np.polyfit(self._signals.grid, self._angle, 1)[0] if self.slope is None else self.slope
+        offset = float(np.mean(self._shown(self._signals.time) - slope)) if self._has_angle else float(slope)
         found.append(Parameter("gyro scale", "", 1.0, SCALE, 1.0))
         found.append(Parameter("gyro offset", "rad/s", offset, WIDE["rad/s"]))
         if not self._has_angle:
@@ -121,7 +127,7 @@ class Readings:
             motion: The motion without the sensors' errors.
 
         Raises:
-            InputError: The readings are not those of an accelerometer that moves so.
+            InputError: The readings do not have gravity's size.
         """
         shown = np.stack([signals.channels.values[name] for name in columns], axis=1)
         self.columns, self._curve, self._time = columns, signals.curve(shown), signals.time
@@ -136,16 +142,7 @@ class Readings:
             seen = np.append(x + side * 1j * z, 0.0)
             line = np.linalg.lstsq(rows, seen, rcond=None)[0]
             lines.append((float(np.mean(np.abs(rows @ line - seen) ** 2)), side, line))
-        rest, side, (A, B, b) = min(lines, key=lambda one: one[0])
-        each = np.stack([*_parts(motion.gravity), *_parts(motion.K), np.ones(n)], axis=1)
-        free = sum(float(np.mean((axis - each @ np.linalg.lstsq(each, axis, rcond=None)[0]) ** 2)) for axis in (x, z))
-        if free > (1.0 - ALIKE) * float(np.var(x) + np.var(z)):
-            raise InputError(f"{name}: does not follow the tilt: are these its columns?")
-        if rest > RIGID**2 * free:
-            raise InputError(
-                f"{name}: its axes fit {math.sqrt(rest / free):.2g} times worse together than each by itself: are both "
-                "columns of one accelerometer, with one scale?"
-            )
+        _, side, (A, B, b) = min(lines, key=lambda one: one[0])
         place, self._angle, self._side = B / A, -float(np.angle(A)), side
         self._start = (place.real, place.imag, self._angle, 1.0, side, b.real, side * b.imag, 0.0)
 
@@ -156,6 +153,28 @@ class Readings:
         rows = zip(PARTS, OF_PARTS, self._start, before, known, strict=True)
         return [Parameter(f"{name} {part}", unit, start, size, mean) for part, unit, start, size, mean in rows]
 
+    def check(self, rest: np.ndarray, motion: State) -> None:
+        """Compare what the fit leaves with what two axes would, each with a place and an angle of its own.
+
+        Args:
+            rest: What the fit leaves, (n_times, 2) [m/s^2].
+            motion: The motion.
+
+        Raises:
+            InputError: The readings are not those of an accelerometer that moves so.
+        """
+        name, shown = f"--accelerometer {','.join(self.columns)}", self._curve(self._time)
+        each = np.stack([*_parts(motion.gravity), *_parts(motion.K), np.ones(len(rest))], axis=1)
+        free = shown - each @ np.linalg.lstsq(each, shown, rcond=None)[0]
+        if np.mean(free.var(axis=0) / shown.var(axis=0)) > ALIKE:
+            raise InputError(f"{name}: does not follow the tilt: are these its columns?")
+        ratio = float(np.max(_size(rest) / _size(free)))
+        if ratio > RIGID:
+            raise InputError(
+                f"{name}: its axes fit {ratio:.2g} times worse together than each by itself: are both columns of one "
+                "accelerometer, with one scale?"
+            )
+
     def shown(self, delay: float) -> np.ndarray:
         """Return its readings, low-passed and advanced by its delay, (n_times, 2) [m/s^2]."""
         return self._curve(self._time + np.clip(delay, -MAX_DELAY_S, MAX_DELAY_S))
@@ -165,6 +184,11 @@ class Readings:
         across, up, angle, s1, s2, o1, o2, delay = values
         f = (motion.gravity + motion.K * complex(across, up)) * np.exp(-1j * angle)
         return self.shown(delay) - np.stack([s1 * np.real(f) + o1, s2 * np.imag(f) + o2], axis=1)
+
+
+def _size(rest: np.ndarray) -> np.ndarray:
+    """Return the usual size of residuals, whatever the few large ones, (n_times, n) -> (n,)."""
+    return np.median(np.abs(rest), axis=0)
 
 
 def _parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -264,7 +288,12 @@ def fit_geometry(signals: Signals) -> Geometry:
             for one, part in zip(readings, values[n:].reshape(-1, len(PARTS)).tolist(), strict=True)
         ]
         if motion.slope is not None:
-            rests.insert(0, (state.rate - motion.slope / errors["tilt scale"])[:, None])
+            # Not rate - slope / scale: a large scale would then hide the slope's noise.
+            rests.insert(0, (motion.slope - errors["tilt scale"] * state.rate)[:, None])
         return np.hstack(rests)
 
-    return Geometry(signals, motion, readings, solve(parameters, residuals, share=0.5))
+    found = Geometry(signals, motion, readings, solve(parameters, residuals, share=2.0 / PER_PERIOD))
+    state = motion.at(found.errors)
+    for i, one in enumerate(readings):
+        one.check(found.solution.residuals[:, found.channels_of(i)], state)
+    return found

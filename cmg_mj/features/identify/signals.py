@@ -18,7 +18,7 @@ SETTLE = 3.0
 """Time that is cut off at both ends, in periods of the cut-off."""
 PER_PERIOD = 4.0
 """Times that are compared in a period of the cut-off: two are independent."""
-CLEAN = 0.01
+CLEAN = 0.005
 """Largest share of noise in the angular acceleration behind the low-pass, by power: places come out too small by it."""
 SEGMENT = 1024
 """Samples of a segment of Welch's spectra."""
@@ -80,9 +80,10 @@ def below(channels: Channels) -> float:
         raise InputError("--columns: name what shows the motion: tilt (an angle sensor), rate (a gyro), or both")
     f, power = spectrum(values["rate" if "rate" in values else "tilt"], channels.dt)
     weight = (2.0 * math.pi * f) ** (2 if "rate" in values else 4)
-    dirty = np.cumsum(weight * floor(power)) > CLEAN * np.cumsum(weight * power)
-    allowed = f[~dirty & (f <= min(BELOW_HZ, BELOW_SHARE / channels.dt))]
-    return float(allowed.max(initial=f[3]))
+    candidates = f[f <= min(BELOW_HZ, BELOW_SHARE / channels.dt)]
+    kept = weight / (1.0 + (f / candidates[:, None]) ** 4) ** 2  # of the filter, forward and backward
+    clean = candidates[floor(power) * kept.sum(axis=1) <= CLEAN * (kept @ power)]
+    return float(clean.max(initial=candidates[:3].max()))
 
 
 def spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
