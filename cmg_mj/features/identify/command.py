@@ -37,6 +37,12 @@ SIGNATURE = "# Written by cmg-mj identify, which may replace this file"
     metavar="HZ",
     help="Compare the channels below this frequency.  [default: 8, or less where noise hides the motion]",
 )
+@click.option(
+    "--momentum",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="N_M_S",
+    help="Spin momentum of the flywheels together, if it is known: with the gimbals' angle it gives the inertia.",
+)
 @click.option("--judge", metavar="LOG", help="A second log, whose motion the result foretells.")
 @click.option(
     "-o",
@@ -53,6 +59,7 @@ def identify(
     log: str,
     accelerometers: tuple[str, ...],
     below_hz: float | None,
+    momentum: float | None,
     judge: str | None,
     out: str,
     as_json: bool,
@@ -70,8 +77,8 @@ def identify(
     import tomli_w
 
     from cmg_mj.features.identify import report
-    from cmg_mj.features.identify.geometry import fit_geometry
-    from cmg_mj.features.identify.signals import Signals, below
+    from cmg_mj.features.identify.identify import identify_rig
+    from cmg_mj.features.identify.signals import Signals
     from cmg_mj.features.replay.reading import read_channels
     from cmg_mj.results.folder import whole_file
 
@@ -83,17 +90,19 @@ def identify(
     channels = read_channels(log, options)
     for remark in channels.notes:
         note(f"{channels.name}: {remark}")
-    signals = Signals(channels, below_hz or below(channels))
-    found = fit_geometry(signals)
-    sizes = report.noises(found)
-    judged = report.judge(found, Signals(read_channels(judge, options), signals.below_hz)) if judge else {}
+    rig = identify_rig(channels, below_hz, momentum)
+    sizes = report.noises(rig.geometry)
+    judged = {channels.name: report.judge(rig, rig.signals)}
+    if judge:
+        other = read_channels(judge, options)
+        judged[f"{other.name} (judges)"] = report.judge(rig, Signals(other, rig.signals.below_hz))
     try:
         with whole_file(path) as temporary:
-            temporary.write_text(f"{SIGNATURE}\n\n{tomli_w.dumps(report.rig_fields(found, sizes))}", encoding="utf-8")
-        report.plot(path.with_suffix(".png"), found)
+            temporary.write_text(f"{SIGNATURE}\n\n{tomli_w.dumps(report.rig_fields(rig, sizes))}", encoding="utf-8")
+        report.plot(path.with_suffix(".png"), rig.geometry)
     except OSError as error:
         raise InputError(f"--out {out}: cannot be written: {error.strerror}") from error
-    show(report.figures(found, sizes, judged), report.tables(found, sizes, judged), as_json)
+    show(report.figures(rig, sizes, judged), report.tables(rig, sizes, judged), as_json)
     note(f"Written to {path}. Use it: {shell_command('cmg-mj', 'replay', log, '--rig', path)}")
 
 

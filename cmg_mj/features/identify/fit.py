@@ -49,6 +49,8 @@ class Solution(NamedTuple):
     numbers: list[Number]
     values: np.ndarray
     """(n_parameters,)"""
+    covariance: np.ndarray
+    """(n_parameters, n_parameters)"""
     residuals: np.ndarray
     """(n_times, n_channels)"""
     sigmas: np.ndarray
@@ -58,8 +60,9 @@ class Solution(NamedTuple):
 def solve(parameters: Sequence[Parameter], residuals: Callable[[np.ndarray], np.ndarray], share: float) -> Solution:
     """Fit parameters to residuals, with what is known before as further residuals.
 
-    Each pass weighs the channels by the inverse of their residuals, and a time whose largest residual is unusual by
-    its inverse (P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical Statistics 35, 1964).
+    Each pass weighs the channels by the inverse of their residuals. A time whose largest residual r is unusual has a
+    weight of 1/r^2, so that a push or a blow hardly counts (weights that fall to zero: A. E. Beaton, J. W. Tukey, "The
+    fitting of power series", Technometrics 16, 1974).
 
     Residuals of a low-passed log are correlated: the slopes of the sum of squares over stretches of the log scatter
     more than those of independent residuals. By this ratio the log weighs less against what is known before (L. Pace,
@@ -76,7 +79,6 @@ def solve(parameters: Sequence[Parameter], residuals: Callable[[np.ndarray], np.
         The parameters that fit best.
     """
     from scipy.optimize import least_squares
-    from scipy.special import stdtrit
 
     before, known = np.array([p.before for p in parameters]), np.array([p.known for p in parameters])
     values, n, largest = np.array([p.start for p in parameters]), len(parameters), share
@@ -89,8 +91,13 @@ def solve(parameters: Sequence[Parameter], residuals: Callable[[np.ndarray], np.
         rest = residuals(values)
         sigmas = 1.4826 * np.median(np.abs(rest), axis=0) + 1e-12
         unusual = np.max(np.abs(rest / sigmas), axis=1, keepdims=True)
-        weights = np.sqrt(share * np.minimum(1.0, USUAL / np.maximum(unusual, 1e-9))) / sigmas
-        options = {"method": "lm", "x_scale": np.minimum(before, 1.0), "xtol": 1e-6, "ftol": 1e-6}
+        weights = np.sqrt(share) * np.minimum(1.0, USUAL / np.maximum(unusual, 1e-9)) / sigmas
+        options = {
+            "method": "lm",
+            "x_scale": np.minimum(before, np.maximum(np.abs(values), 1e-3)),
+            "xtol": 1e-6,
+            "ftol": 1e-6,
+        }
         found = least_squares(weighed, values, args=(weights,), **options)
         values, slopes = found.x, found.jac[:-n]
         inverse = np.linalg.inv(found.jac.T @ found.jac)
@@ -106,10 +113,17 @@ def solve(parameters: Sequence[Parameter], residuals: Callable[[np.ndarray], np.
             p.name,
             p.unit,
             float(value),
-            float(stdtrit(BLOCKS - 1, 0.975) * size),
+            float(within(size)),
             bool(size < UNTOLD * p.before),
             parameters[row.argmax()].name if row.max() > APART else "",
         )
         for p, value, size, row in zip(parameters, values, sizes, alike, strict=True)
     ]
-    return Solution(numbers, values, residuals(values), sigmas)
+    return Solution(numbers, values, covariance, residuals(values), sigmas)
+
+
+def within(sigma: np.ndarray | float) -> np.ndarray | float:
+    """Return half the 95 % interval of a standard deviation that comes from `BLOCKS` stretches: Student's."""
+    from scipy.special import stdtrit
+
+    return stdtrit(BLOCKS - 1, 0.975) * sigma

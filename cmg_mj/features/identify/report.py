@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Group
+from rich.console import Group, RenderableType
+from rich.text import Text
 
 from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.identify.geometry import ERRORS, Geometry, Motion, Readings
+from cmg_mj.features.identify.identify import Identified
+from cmg_mj.features.identify.pendulum import Pendulum
 from cmg_mj.features.identify.signals import PER_PERIOD, Signals, floor, spectrum
 from cmg_mj.features.replay.log import UNITS
 from cmg_mj.results.summary_keys import SummaryValue
@@ -49,13 +52,14 @@ def noises(found: Geometry) -> dict[str, float]:
     return sizes
 
 
-def rig_fields(found: Geometry, sizes: Mapping[str, float]) -> dict[str, Any]:
+def rig_fields(rig: Identified, sizes: Mapping[str, float]) -> dict[str, Any]:
     """Return the fields of the rig file.
 
     Args:
-        found: The geometry.
+        rig: The rig.
         sizes: The channels' noise.
     """
+    found = rig.geometry
     options, errors = found.signals.channels.options, ERRORS | found.errors
     log = options.as_toml()
     for other in ("rig", "time_range_s"):
@@ -85,9 +89,14 @@ def rig_fields(found: Geometry, sizes: Mapping[str, float]) -> dict[str, Any]:
             "noise_m_s2": _rounded(sizes[f"accelerometer {i + 1}"]),
         }
         accelerometers.append(fields)
-    rest = {"accelerometer": accelerometers} if accelerometers else {}
+    rest: dict[str, Any] = {"accelerometer": accelerometers} if accelerometers else {}
     if "tilt" in sizes:
         rest = {"angle_noise_deg": _rounded(math.degrees(sizes["tilt"])), **rest}
+    numbers = {number.name: _rounded(number.value) for number in rig.numbers}
+    if "inertia J" in numbers:
+        rest["pendulum"] = {"inertia": numbers["inertia J"], "gravity_torque": numbers["m g l"]}
+        if rig.momentum is not None:
+            rest["pendulum"] |= {"momentum": rig.momentum, "gimbal_inertia": numbers["J2"]}
     return {**rest, "log": log}
 
 
@@ -95,18 +104,19 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def judge(found: Geometry, signals: Signals) -> dict[str, float]:
-    """Compute the share of a log's motion that the accelerometers foretell with the geometry: R^2.
+def judge(rig: Identified, signals: Signals) -> dict[str, float]:
+    """Compute the share of a log's motion that the rig foretells: R^2.
 
     The motion is that of the log's gyro and angle sensor, behind the low-pass.
 
     Args:
-        found: The geometry.
+        rig: The rig.
         signals: The log, which has all columns.
 
     Returns:
-        R^2 of angular acceleration and tilt, by the sensors that show it.
+        R^2 of angular acceleration and tilt, by what foretells it.
     """
+    found = rig.geometry
     motion = Motion(signals)
     state = motion.at(found.errors | {p.name: p.start for p in motion.parameters if p.name == "gyro offset"})
     places, forces = [], []
@@ -124,6 +134,11 @@ def judge(found: Geometry, signals: Signals) -> dict[str, float]:
             shares[f"angular acceleration by {by}"] = _explained(-np.imag(state.K), acceleration)
             if not has_angle:
                 shares[f"tilt by {by}"] = _explained(tilt, y)
+    if rig.pendulum:
+        pendulum = Pendulum(signals, state, rig.momentum)
+        shares["angular acceleration by the pendulum"] = _explained(
+            pendulum.acceleration, pendulum.foretell(rig.pendulum.values)
+        )
     return shares
 
 
@@ -131,10 +146,10 @@ def _explained(true: np.ndarray, foretold: np.ndarray) -> float:
     return 1.0 - float(np.mean((foretold - true) ** 2) / np.var(true))
 
 
-def tables(found: Geometry, sizes: Mapping[str, float], judged: Mapping[str, float]) -> Group:
-    """Make the tables of parameters with their intervals, of noise, and of what a second log says."""
+def tables(rig: Identified, sizes: Mapping[str, float], judged: Mapping[str, Mapping[str, float]]) -> Group:
+    """Make the tables of parameters with their intervals, of noise, and of what logs say to both."""
     rows = []
-    for number in found.solution.numbers:
+    for number in rig.numbers:
         unit, factor = SHOWN.get(number.unit, (number.unit, 1.0))
         digits = max(0, 1 - math.floor(math.log10(max(factor * number.error, 1e-9))))
         value, error = (f"{factor * size:.{digits}f}" for size in (number.value, number.error))
@@ -145,11 +160,16 @@ def tables(found: Geometry, sizes: Mapping[str, float], judged: Mapping[str, flo
         unit, factor = {"tilt": ("deg", math.degrees(1.0)), "rate": ("rad/s", 1.0)}.get(name, ("m/s^2", 1.0))
         rows.append({"name": f"{name} noise", "value": f"{factor * size:.3g}", "unit": unit, "remark": "of a sample"})
     columns = {"name": "parameter", "value": "value, 95 %", "unit": "unit", "remark": "remark"}
-    title = f"{found.signals.channels.name}, below {found.signals.below_hz:.3g} Hz"
-    parts = [Table(columns, rows, title, _cell).rich()]
-    if judged:
-        shares = [{"name": name, "share": f"{share:.3f}"} for name, share in judged.items()]
-        parts.append(Table({"name": "foretold on the second log", "share": "R^2"}, shares, "", _cell).rich())
+    title = f"{rig.signals.channels.name}, below {rig.signals.below_hz:.3g} Hz"
+    parts: list[RenderableType] = [Table(columns, rows, title, _cell).rich()]
+    names = dict.fromkeys(name for shares in judged.values() for name in shares)
+    if names:
+        shares = [{"name": n, **{log: f"{its[n]:.3f}" for log, its in judged.items()}} for n in names]
+        parts.append(Table({"name": "R^2", **{log: log for log in judged}}, shares, "", _cell).rich())
+    if rig.pendulum is None:
+        parts.append(Text("No pendulum: no column is the torque (--columns torque=...) or the gimbals' angle."))
+    elif "inertia J" not in {number.name for number in rig.numbers}:
+        parts.append(Text("Of the pendulum only ratios are known: give the torque in N m (--units), or --momentum."))
     return Group(*parts)
 
 
@@ -157,13 +177,17 @@ def _cell(row: Row, key: str) -> str:
     return str(row[key])
 
 
-def figures(found: Geometry, sizes: Mapping[str, float], judged: Mapping[str, float]) -> dict[str, Any]:
+def figures(rig: Identified, sizes: Mapping[str, float], judged: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
     """Return what `--json` prints."""
     parameters: dict[str, dict[str, SummaryValue]] = {
         n.name: {"value": n.value, "low": n.value - n.error, "high": n.value + n.error, "unit": n.unit, "told": n.told}
-        for n in found.solution.numbers
+        for n in rig.numbers
     }
-    return {"parameters": parameters, "noise": dict(sizes), "judged": dict(judged)}
+    return {
+        "parameters": parameters,
+        "noise": dict(sizes),
+        "r_squared": {name: dict(shares) for name, shares in judged.items()},
+    }
 
 
 def plot(path: Path, found: Geometry) -> None:

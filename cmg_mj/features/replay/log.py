@@ -262,6 +262,7 @@ ROLES: dict[str, Quantity] = {
     "command": "rate",
     "rate": "rate",
     "torque": "torque",
+    "wheel": "rate",
 }
 """Role -> quantity of its column.
 
@@ -269,7 +270,7 @@ ROLES: dict[str, Quantity] = {
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
 `gimbal2`, whose half difference it is), `command` their rate, `rate` the reference, `torque` a motor's torque on the
-body, or its current.
+body, or its current, `wheel` the speed of the wheel that it drives.
 """
 
 _ASSIGNMENT = re.compile(
