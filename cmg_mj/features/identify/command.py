@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cmg_mj.cli.arguments import json_option, overwrites
+from cmg_mj.cli.arguments import json_option
 from cmg_mj.cli.terminal import note, shell_command, show, users_code
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.replay.command import log_options
@@ -52,6 +52,7 @@ SIGNATURE = "# Written by cmg-mj identify, which may replace this file"
     metavar="FILE",
     help="Rig file to write; the plot gets the same name with .png.",
 )
+@click.option("--overwrite", is_flag=True, help="Replace the files of an earlier call.")
 @json_option()
 @users_code()
 def identify(
@@ -62,6 +63,7 @@ def identify(
     momentum: float | None,
     judge: str | None,
     out: str,
+    overwrite: bool,
     as_json: bool,
 ) -> None:
     """Find where the accelerometers of a rig sit, and what is wrong with its sensors, from one LOG.
@@ -82,9 +84,8 @@ def identify(
     from cmg_mj.features.replay.reading import read_channels
     from cmg_mj.results.folder import whole_file
 
-    path = Path(out)
-    if path.exists() and not overwrites() and not path.read_bytes().startswith(SIGNATURE.encode()):
-        raise InputError(f"--out {out}: is there, and not by this command: name another file, or give --overwrite")
+    path, picture = Path(out), Path(out).with_suffix(".png")
+    _check_target(path, picture, overwrite=overwrite)
     if accelerometers:
         options = replace(options, rig=options.rig.model_copy(update={"accelerometer": _unplaced(accelerometers)}))
     channels = read_channels(log, options)
@@ -99,11 +100,22 @@ def identify(
     try:
         with whole_file(path) as temporary:
             temporary.write_text(f"{SIGNATURE}\n\n{tomli_w.dumps(report.rig_fields(rig, sizes))}", encoding="utf-8")
-        report.plot(path.with_suffix(".png"), rig.geometry)
+        report.plot(picture, rig.geometry)
     except OSError as error:
-        raise InputError(f"--out {out}: cannot be written: {error.strerror}") from error
+        raise InputError(f"-o {out}: cannot be written: {error.strerror}") from error
     show(report.figures(rig, sizes, judged), report.tables(rig, sizes, judged), as_json)
     note(f"Written to {path}. Use it: {shell_command('cmg-mj', 'replay', log, '--rig', path)}")
+
+
+def _check_target(path: Path, picture: Path, *, overwrite: bool) -> None:
+    """Refuse to replace files of others, and those of an earlier call without being asked to."""
+    if path.suffix != ".toml":
+        raise InputError(f"-o {path}: a rig file ends in .toml")
+    if path.exists() and not path.read_bytes().startswith(SIGNATURE.encode()):
+        raise InputError(f"-o {path}: is there, and not by this command: give another name")
+    for file in (path, picture):
+        if file.exists() and not overwrite:
+            raise InputError(f"-o {path}: {file} exists; give another name, or --overwrite")
 
 
 def _unplaced(texts: tuple[str, ...]) -> tuple[PlacedAccelerometer, ...]:
@@ -113,12 +125,10 @@ def _unplaced(texts: tuple[str, ...]) -> tuple[PlacedAccelerometer, ...]:
 
     found = []
     for text in texts:
-        first, second, unit, *rest = [*map(str.strip, text.split(",")), "", ""]
-        if not second or rest != [""] * min(len(rest), 1):
-            raise InputError(
-                f"--accelerometer {text}: write the headings of its two axes, x1,y1, and perhaps a unit, x1,y1,g"
-            )
+        first, second, *rest = parts = [*map(str.strip, text.split(",")), ""][: max(2, text.count(",") + 1)]
+        if len(rest) > 1 or not all(parts):
+            raise InputError(f"--accelerometer {text}: write the headings of its two axes and perhaps a unit: x1,y1,g")
         by_name = {unit_of_name("acceleration", name) for name in (first, second)}
-        unit = unit or (by_name.pop() if len(by_name) == 1 else None) or "m_s2"
+        unit = rest[0] if rest else (by_name.pop() if len(by_name) == 1 else None) or "m_s2"
         found.append(PlacedAccelerometer(columns=(first, second), unit=unit, place_m=(0.0, 0.0)))
     return tuple(found)

@@ -12,12 +12,14 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.identify.fit import Parameter, Solution, solve
-from cmg_mj.features.identify.signals import MAX_DELAY_S, PER_PERIOD, Signals
+from cmg_mj.features.identify.fit import BLOCKS, Parameter, Solution, solve
+from cmg_mj.features.identify.signals import MAX_DELAY_S, PER_PERIOD, SETTLE, Signals
 from cmg_mj.features.replay.log import UNITS
 
 SCALE, OFFSET = 0.03, 0.6
 """Standard deviations of what is known before: datasheets' errors of scale, and offsets of accelerometers [m/s^2]."""
+FAR = 5.0
+"""A scale or an offset that is so many of these standard deviations off is a mistake."""
 WIDE = {"m": 0.5, "rad": math.pi, "s": 0.05, "rad/s": 0.3, "rad/s^2": 1e-3}
 """Standard deviations of the rest, so wide that they only keep finite what a log cannot tell."""
 PARTS = ("across", "up", "angle", "scale 1", "scale 2", "offset 1", "offset 2", "delay")
@@ -67,15 +69,15 @@ class Motion:
         from scipy.integrate import cumulative_trapezoid
 
         values = signals.channels.values
-        self._signals, self._has_angle, self._has_rate = signals, "tilt" in values, "rate" in values
+        self.signals, self._has_angle, self._has_rate = signals, "tilt" in values, "rate" in values
         if self._has_angle:
             self._angle = values["tilt"]
         else:
             self._angle = cumulative_trapezoid(values["rate"], dx=signals.channels.dt, initial=0.0)
         angle = signals.curve(self._angle)
-        self._shown, self._square = (lambda t, order=0: angle(t, order + 1)), signals.curve(angle(signals.grid, 1) ** 2)
-        if self._has_rate:
-            self._shown, self._square = signals.curve(values["rate"]), signals.curve(values["rate"] ** 2)
+        self._raw = values["rate"] if self._has_rate else angle(signals.grid, 1)
+        self._square = signals.curve(self._raw**2)
+        self._shown = signals.curve(self._raw) if self._has_rate else lambda t, order=0: angle(t, order + 1)
         self.slope = angle(signals.time, 1) if self._has_angle and self._has_rate else None
         """The derivative of what the angle sensor shows beside a gyro, (n_times,) [rad/s]."""
 
@@ -85,8 +87,8 @@ class Motion:
         found = [] if not self._has_angle else [Parameter("tilt scale", "", 1.0, SCALE, 1.0)]
         if not self._has_rate:
             return found
-        slope = np.polyfit(self._signals.grid, self._angle, 1)[0] if self.slope is None else self.slope
-        offset = float(np.mean(self._shown(self._signals.time) - slope)) if self._has_angle else float(slope)
+        slope = np.polyfit(self.signals.grid, self._angle, 1)[0] if self.slope is None else self.slope
+        offset = float(np.mean(self._shown(self.signals.time) - slope)) if self._has_angle else float(slope)
         found.append(Parameter("gyro scale", "", 1.0, SCALE, 1.0))
         found.append(Parameter("gyro offset", "rad/s", offset, WIDE["rad/s"]))
         if not self._has_angle:
@@ -98,18 +100,25 @@ class Motion:
         of_tilt, scale, offset, drift, delay = (ERRORS | dict(errors)).values()
         if not self._has_rate:
             scale = of_tilt
-        t = self._signals.time + np.clip(delay, -MAX_DELAY_S, MAX_DELAY_S)
+        t = self.signals.time + np.clip(delay, -MAX_DELAY_S, MAX_DELAY_S)
         off = offset + drift * t
         shown = self._shown(t)
         square = (self._square(t) - 2.0 * off * shown + off**2) / scale**2
         force = self._gravity(of_tilt) if self._has_angle else self._gravity(scale, offset, drift)
         return State(force, -1j * (self._shown(t, 1) - drift) / scale - square, (shown - off) / scale)
 
+    def signs(self, errors: Mapping[str, float], width: float) -> np.ndarray:
+        """Return tanh(rate / width), low-passed as the whole and not by parts, (n_times,)."""
+        of_tilt, scale, offset, drift, delay = (ERRORS | dict(errors)).values()
+        t = self.signals.grid
+        shown = (self._raw - offset - drift * t) / (scale if self._has_rate else of_tilt)
+        return self.signals.curve(np.tanh(shown / width))(self.signals.time + delay)
+
     @functools.lru_cache(maxsize=2)  # noqa: B019  (lives as long as a fit)
     def _gravity(self, scale: float, offset: float = 0.0, drift: float = 0.0) -> np.ndarray:
-        t = self._signals.grid
+        t = self.signals.grid
         tilt = (self._angle - offset * t - drift * t**2 / 2.0) / scale
-        return self._signals.curve(gravity(tilt if self._has_angle else tilt - tilt.mean()))(self._signals.time)
+        return self.signals.curve(gravity(tilt if self._has_angle else tilt - tilt.mean()))(self.signals.time)
 
 
 class Readings:
@@ -118,21 +127,22 @@ class Readings:
     The second axis may point to either side of the first: the side that fits better is taken.
     """
 
-    def __init__(self, signals: Signals, columns: tuple[str, str], motion: State) -> None:
+    def __init__(self, signals: Signals, columns: tuple[str, str], unit: str, motion: State) -> None:
         """Find the start.
 
         Args:
             signals: The log.
             columns: Headings of both axes.
+            unit: Their unit, for a message.
             motion: The motion without the sensors' errors.
 
         Raises:
             InputError: The readings do not have gravity's size.
         """
         shown = np.stack([signals.channels.values[name] for name in columns], axis=1)
-        self.columns, self._curve, self._time = columns, signals.curve(shown), signals.time
-        name = f"--accelerometer {','.join(columns)}"
-        _check_gravity(name, np.median(np.hypot(*shown.T)))
+        self.columns, self.unit = columns, unit
+        self._curve, self._time = signals.curve(shown), signals.time
+        _check_gravity(columns, np.median(np.hypot(*shown.T)), unit)
         x, z = self._curve(signals.time).T
         n = len(x)
         # An offset is small: without this, it and gravity are one where the tilt hardly changes.
@@ -195,12 +205,14 @@ def _parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.real(values), np.imag(values)
 
 
-def _check_gravity(name: str, size: float) -> None:
-    ratio = size / STANDARD_GRAVITY
+def _check_gravity(columns: tuple[str, str], size: float, unit: str) -> None:
+    ratio, name = size / STANDARD_GRAVITY, f"--accelerometer {','.join(columns)}"
     if not NEAR[0] <= ratio <= NEAR[1]:
-        units = [unit for unit, factor in UNITS["acceleration"].items() if NEAR[0] <= ratio * factor <= NEAR[1]]
-        cure = f"give its unit, as {name},{units[0]}" if units else "are these its columns?"
-        raise InputError(f"{name}: shows {ratio:.3g} times gravity's 9.81 m/s^2: {cure}")
+        factors = UNITS["acceleration"]
+        now = factors.get(unit, 1.0)
+        right = [other for other, factor in factors.items() if NEAR[0] <= ratio * factor / now <= NEAR[1]]
+        cure = f"give the right unit, as in {name},{right[0]}" if right else "are these its columns?"
+        raise InputError(f"{name}: shows {ratio:.3g} times gravity's 9.81 m/s^2, taken as {unit}: {cure}")
 
 
 def _check_rate(motion: Motion, rate: np.ndarray) -> None:
@@ -270,11 +282,18 @@ def fit_geometry(signals: Signals) -> Geometry:
     Raises:
         InputError: A column, sign or unit is wrong.
     """
+    if len(signals.time) < 3 * BLOCKS:
+        name, hz = signals.channels.name, signals.below_hz
+        least = 2.0 * (SETTLE / hz + MAX_DELAY_S) + 3 * BLOCKS / (PER_PERIOD * hz)
+        raise InputError(
+            f"{name}: lasts {signals.grid[-1]:.3g} s; below {hz:.3g} Hz, where noise does not hide the motion, it "
+            f"takes {least:.3g} s: give a longer log, or --below-hz"
+        )
     motion = Motion(signals)
     own = motion.parameters
     start = motion.at({p.name: p.start for p in own})
     _check_rate(motion, start.rate)
-    readings = [Readings(signals, one.columns, start) for one in signals.channels.options.rig.accelerometer]
+    readings = [Readings(signals, one.columns, one.unit, start) for one in signals.channels.options.rig.accelerometer]
     parameters = [*own]
     for number, one in enumerate(readings, 1):
         parameters += one.parameters(f"accelerometer {number}")
@@ -294,6 +313,13 @@ def fit_geometry(signals: Signals) -> Geometry:
 
     found = Geometry(signals, motion, readings, solve(parameters, residuals, share=2.0 / PER_PERIOD))
     state = motion.at(found.errors)
+    for number, parameter in zip(found.solution.numbers, parameters, strict=True):
+        off = number.value - parameter.known
+        if parameter.before in (SCALE, OFFSET) and abs(off) > FAR * parameter.before:
+            raise InputError(
+                f"{number.name} = {' '.join([f'{number.value:.3g}', number.unit]).strip()}: no sensor is so far off "
+                f"{parameter.known:g}: is a unit, a column or the angle sensor's --scale wrong?"
+            )
     for i, one in enumerate(readings):
         one.check(found.solution.residuals[:, found.channels_of(i)], state)
     return found

@@ -51,7 +51,7 @@ def identify_rig(channels: Channels, below_hz: float | None = None, momentum: fl
     if not channels.options.rig.accelerometer and not values.keys() >= {"tilt", "rate"}:
         raise InputError("--accelerometer: give the columns of one, or both tilt and rate: there is nothing to compare")
     geometry = fit_geometry(signals)
-    pendulum = fit_pendulum(signals, geometry, momentum)[1] if has_pendulum(signals) else None
+    pendulum = fit_pendulum(geometry, momentum)[1] if has_pendulum(signals) else None
     if momentum is not None and pendulum is None:
         raise InputError(f"--momentum {momentum:g}: goes with the gimbals' angle, --columns gimbal=...")
     return Identified(signals, geometry, pendulum, momentum)

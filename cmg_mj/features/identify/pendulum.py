@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.identify.fit import Parameter, Solution, solve, within
-from cmg_mj.features.identify.geometry import WIDE, Geometry, State
+from cmg_mj.features.identify.geometry import WIDE, Geometry, Motion
 from cmg_mj.features.identify.signals import MAX_DELAY_S, PER_PERIOD, Signals
 
-STICKS, SPINS = 0.02, 2.0
+STICKS, SPINS = 0.02, 1.0
 """Dry friction turns round over so many rad/s of the body and of a wheel: it is C tanh(rate / STICKS)."""
 MANY, TILTED = 1e3, 0.3
 """Standard deviations of what is known before: so many first estimates, and the equilibrium's tilt [rad]."""
@@ -40,20 +41,21 @@ class Pendulum:
         is_known: Whether the numbers are no ratios.
     """
 
-    def __init__(self, signals: Signals, state: State, momentum: float | None) -> None:
+    def __init__(self, motion: Motion, errors: Mapping[str, float], momentum: float | None) -> None:
         """Low-pass what acts.
 
         Args:
-            signals: The log.
-            state: Its motion.
+            motion: The motion of a log.
+            errors: What is wrong with its angle sensor and gyro, as in `ERRORS`.
             momentum: Spin momentum of the flywheels, if it is known [N m s].
 
         Raises:
             InputError: The momentum is that of no gimbals.
         """
+        signals, state = motion.signals, motion.at(errors)
         values, self._time = signals.channels.values, signals.time
         self.acceleration, self._force = -np.imag(state.K), state.gravity / STANDARD_GRAVITY
-        self._terms = {"damping": -state.rate, "dry friction": -np.tanh(state.rate / STICKS)}
+        self._terms = {"damping": -state.rate, "dry friction": -motion.signs(errors, STICKS)}
         self._has_motor, self._gain = "torque" in values, 1.0 if momentum is None else momentum
         if self._has_motor and momentum is not None:
             raise InputError(f"--momentum {momentum:g}: goes with --columns gimbal=..., not with torque")
@@ -115,14 +117,13 @@ class Pendulum:
         return found
 
 
-def fit_pendulum(signals: Signals, geometry: Geometry, momentum: float | None) -> tuple[Pendulum, Solution]:
+def fit_pendulum(geometry: Geometry, momentum: float | None) -> tuple[Pendulum, Solution]:
     """Fit the numbers of a pendulum to a log's angular acceleration.
 
     The errors of angle sensor and gyro, by which all scales are known, go into the intervals.
 
     Args:
-        signals: The log.
-        geometry: What is known of the sensors.
+        geometry: The log, and what is known of the sensors.
         momentum: Spin momentum of the flywheels, if it is known [N m s].
 
     Raises:
@@ -133,7 +134,7 @@ def fit_pendulum(signals: Signals, geometry: Geometry, momentum: float | None) -
     def fitted(by: int | None = None) -> tuple[Pendulum, Solution]:
         shift = 0.0 if by is None else math.sqrt(sensors.covariance[by, by])
         errors = {name: value + shift * (i == by) for i, (name, value) in enumerate(geometry.errors.items())}
-        pendulum = Pendulum(signals, geometry.motion.at(errors), momentum)
+        pendulum = Pendulum(geometry.motion, errors, momentum)
         return pendulum, solve(
             pendulum.parameters,
             lambda values: (pendulum.foretell(values) - pendulum.acceleration)[:, None],

@@ -117,25 +117,28 @@ def judge(rig: Identified, signals: Signals) -> dict[str, float]:
         R^2 of angular acceleration and tilt, by what foretells it.
     """
     found = rig.geometry
-    motion = Motion(signals)
-    state = motion.at(found.errors | {p.name: p.start for p in motion.parameters if p.name == "gyro offset"})
+    motion, errors = Motion(signals), found.errors
+    if signals is not found.signals:  # an offset is another one every day
+        errors |= {p.name: p.start for p in motion.parameters if p.name == "gyro offset"}
+    state = motion.at(errors)
     places, forces = [], []
     for i, reading in enumerate(found.readings):
         across, up, angle, s1, s2, o1, o2, delay = found.of(i)
-        x, z = Readings(signals, reading.columns, state).shown(delay).T
+        x, z = Readings(signals, reading.columns, reading.unit, state).shown(delay).T
         places.append(complex(across, up))
         forces.append(((x - o1) / s1 + 1j * (z - o2) / s2) * np.exp(1j * angle))
     tilt, shares = np.angle(state.gravity / 1j), {}
+    known = "tilt" in signals.channels.values
     for has_angle in (False, True):
-        if len(places) > 1 or has_angle:
+        if places and (known if has_angle else len(places) > 1):
             geometry = PlanarTilt(tuple(places), (1.0,) * len(places), STANDARD_GRAVITY, has_angle)
             y, acceleration = geometry(forces, tilt if has_angle else None)
             by = "accelerometers and tilt" if has_angle else "accelerometers alone"
             shares[f"angular acceleration by {by}"] = _explained(-np.imag(state.K), acceleration)
-            if not has_angle:
+            if known and not has_angle:
                 shares[f"tilt by {by}"] = _explained(tilt, y)
     if rig.pendulum:
-        pendulum = Pendulum(signals, state, rig.momentum)
+        pendulum = Pendulum(motion, errors, rig.momentum)
         shares["angular acceleration by the pendulum"] = _explained(
             pendulum.acceleration, pendulum.foretell(rig.pendulum.values)
         )

@@ -10,10 +10,11 @@ from scipy.interpolate import CubicSpline
 from cmg_mj.features.replay.log import Channels, ReadOptions
 from cmg_mj.features.replay.rig import PlacedAccelerometer, Rig
 
-G = 9.81
+G = 9.80665
 ACCELEROMETER_NOISE = 400e-6 * G * np.sqrt(100.0)
 GYRO_NOISE = np.radians(0.005) * np.sqrt(100.0)
-COUNT = 2.0 * np.pi / 4096.0
+TILT_NOISE, COUNT = 0.001, 2.0 * np.pi / 4096.0
+PARTS = ("across", "up", "angle", "scale 1", "scale 2", "offset 1", "offset 2", "delay")
 
 
 class SimulatedLog(NamedTuple):
@@ -24,38 +25,48 @@ class SimulatedLog(NamedTuple):
 
 
 def simulated_log(
-    time: np.ndarray, tilt: np.ndarray, seed: int, *, angle: bool = True, gyro: bool = True
+    time: np.ndarray, tilt: np.ndarray, seed: int, *, angle: bool = True, gyro: bool = True, n_accelerometers: int = 2
 ) -> SimulatedLog:
-    """Make a log of a motion: tilt sensor, gyro and two accelerometers, by the derivatives of a curve through the tilt.
+    """Make a log of a motion by the derivatives of a curve through the tilt.
 
     Errors are drawn from what datasheets allow, delays up to two samples.
     """
-    rng = np.random.default_rng(seed)
-    curve = CubicSpline(time, tilt)
-    dt = float(time[1] - time[0])
-    t = time[5:-5]
-    scale = 1.0 + 0.02 * rng.normal(size=2)
-    truth = {"tilt scale": scale[0], "gyro scale": scale[1], "gyro offset": 0.02 * rng.normal()}
-    truth["gyro delay"] = dt * rng.uniform(-2.0, 2.0) if angle else 0.0
+    rng, curve, t, dt = np.random.default_rng(seed), CubicSpline(time, tilt), time[5:-5], float(time[1] - time[0])
+    of_tilt, of_rate = 1.0 + 0.02 * rng.normal(size=2)
+    offset, late = 0.02 * rng.normal(), dt * rng.uniform(-2.0, 2.0)
     values: dict[str, np.ndarray] = {}
+    truth = {"gyro scale": of_rate, "gyro offset": offset}
     if angle:
-        shown = truth["tilt scale"] * (curve(t) + 0.001 * rng.normal(size=len(t)))
-        values["tilt"] = COUNT * np.round(shown / COUNT)
+        truth |= {"tilt scale": of_tilt, "gyro delay": late}
+        values["tilt"] = COUNT * np.round(of_tilt * (curve(t) + TILT_NOISE * rng.normal(size=len(t))) / COUNT)
     if gyro:
-        rate = curve(t - truth["gyro delay"], 1)
-        values["rate"] = truth["gyro scale"] * rate + truth["gyro offset"] + GYRO_NOISE * rng.normal(size=len(t))
+        rate = curve(t - late * angle, 1)
+        values["rate"] = of_rate * rate + offset + GYRO_NOISE * rng.normal(size=len(t))
     placed = []
-    for name in ("1", "2"):
-        columns, side = (f"x{name}", f"y{name}"), rng.choice([-1.0, 1.0])
-        across, up, delay = rng.uniform(-0.1, 0.1), rng.uniform(0.1, 0.4), dt * rng.uniform(-2.0, 2.0)
-        turned, (s1, s2), (o1, o2) = rng.uniform(-3.0, 3.0), 1.0 + 0.02 * rng.normal(size=2), 0.3 * rng.normal(size=2)
-        s2 *= side
-        y, rate, alpha = (curve(t - delay, order) for order in range(3))
-        f = (1j * G * np.exp(1j * y) + (-1j * alpha - rate**2) * complex(across, up)) * np.exp(-1j * turned)
-        noise = ACCELEROMETER_NOISE * rng.normal(size=(2, len(t)))
-        values[columns[0]], values[columns[1]] = s1 * f.real + o1 + noise[0], s2 * f.imag + o2 + noise[1]
-        parts = ("across", "up", "angle", "scale 1", "scale 2", "offset 1", "offset 2", "delay")
-        its = (across, up, turned, s1, s2, o1, o2, delay)
-        truth |= {f"accelerometer {name} {part}": float(value) for part, value in zip(parts, its, strict=True)}
+    for number in range(1, n_accelerometers + 1):
+        place, turned = complex(rng.uniform(-0.1, 0.1), rng.uniform(0.1, 0.4)), rng.uniform(-3.0, 3.0)
+        s1, s2 = (1.0 + 0.02 * rng.normal(size=2)) * [1.0, rng.choice([-1.0, 1.0])]
+        (o1, o2), late = 0.3 * rng.normal(size=2), dt * rng.uniform(-2.0, 2.0)
+        y, rate, alpha = (curve(t - late, order) for order in range(3))
+        f = (1j * G * np.exp(1j * y) - (1j * alpha + rate**2) * place) * np.exp(-1j * turned)
+        x, z = [s1 * f.real + o1, s2 * f.imag + o2] + ACCELEROMETER_NOISE * rng.normal(size=(2, len(t)))
+        columns = (f"x{number}", f"y{number}")
+        values |= dict(zip(columns, (x, z), strict=True))
+        its = (place.real, place.imag, turned, s1, s2, o1, o2, late)
+        truth |= {f"accelerometer {number} {part}": float(value) for part, value in zip(PARTS, its, strict=True)}
         placed.append(PlacedAccelerometer(columns=columns, place_m=(0.0, 0.0)))
-    return SimulatedLog(Channels("simulated", dt, values, ReadOptions(rig=Rig(accelerometer=tuple(placed))), ()), truth)
+    options = ReadOptions(units={"torque": "n_m"}, rig=Rig(accelerometer=tuple(placed)))
+    return SimulatedLog(Channels("simulated", dt, values, options, ()), truth)
+
+
+def swaying(duration: float, dt: float = 0.01) -> tuple[np.ndarray, np.ndarray]:
+    """Make a motion of several tones, as under a hand: times and tilts, (n,) [s, rad]."""
+    time = np.arange(0.0, duration, dt)
+    tones = ((0.09, 0.4), (0.05, 1.1), (0.012, 2.3), (0.003, 4.1))
+    return time, sum((size * np.sin(2.0 * np.pi * f * time + f) for size, f in tones), np.zeros(len(time)))
+
+
+def off(number: float, true: float, name: str) -> float:
+    """Return an error; of an angle, without whole turns."""
+    error = number - true
+    return (error + np.pi) % (2.0 * np.pi) - np.pi if name.endswith("angle") else error
