@@ -50,6 +50,8 @@ def identify_rig(channels: Channels, below_hz: float | None = None, momentum: fl
     values = channels.values
     if not channels.options.rig.accelerometer and not values.keys() >= {"tilt", "rate"}:
         raise InputError("--accelerometer: give the columns of one, or both tilt and rate: there is nothing to compare")
+    if "wheel" in values and "torque" not in values:
+        raise InputError("--columns wheel: goes with torque, the motor's that drives it")
     geometry = fit_geometry(signals)
     pendulum = fit_pendulum(geometry, momentum)[1] if has_pendulum(signals) else None
     if momentum is not None and pendulum is None:

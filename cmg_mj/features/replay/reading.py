@@ -122,8 +122,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
         slowest = BALANCED_HZ
-    if "torque" in columns:
-        notes.append(f"the torque {columns['torque'].name!r} is not used: no observer takes one")
+    if unused := columns.keys() & {"torque", "wheel"}:
+        notes.append(f"not used, because no observer takes it: {' and '.join(sorted(unused))}")
     clipped = _clipped_rows(signals, columns, notes)
     measured = _measured(signals, geometry, options.rig.accelerometer, notes)
     period, dt, segments = _sample(path, time, measured, options, slowest, notes)
