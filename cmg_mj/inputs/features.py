@@ -107,7 +107,7 @@ FEATURES = {
         commands={
             "identify": Command(
                 "cmg_mj.features.identify.command:identify",
-                "Find places and errors of your rig's sensors, and its pendulum, from a log.",
+                "Find places and errors of a rig's sensors from a log.",
             )
         },
         needs=("replay",),
