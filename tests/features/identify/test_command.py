@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.features.replay.rig import load_rig
-from tests.command import cmg_mj
+from tests.command import ROOT, cmg_mj
 from tests.features.identify.simulated import simulated_log, swaying
 
 COLUMNS = ("--columns", "time=time_s,tilt=tilt_rad,rate=rate_rad_s", "--accelerometer", "x1,y1")
@@ -45,6 +45,15 @@ def test_writes_a_rig_that_replay_takes(log: dict[str, float]) -> None:
     assert cmg_mj("replay", "other.csv", "--rig", "rig.toml", "--observers", "gyro_free", "--json").status == 0
     again = cmg_mj("identify", "log.csv", *COLUMNS)
     assert again.complaint == "-o rig.toml: rig.toml exists; give another name, or --overwrite"
+
+
+def test_the_delay_of_a_real_gyro(elsewhere: None) -> None:
+    log = ROOT / "examples/data/stepper_encoder_gyro.csv"
+    columns = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
+    figures = json.loads(cmg_mj("identify", log, "--columns", columns, "--json").out)["parameters"]
+    assert figures["gyro delay"]["value"] == pytest.approx(0.0121, abs=1e-4)  # by correlation: docs/replay.md
+    ratio = figures["tilt scale"]["value"] / figures["gyro scale"]["value"]
+    assert ratio == pytest.approx(1.0157, abs=0.003)
 
 
 @pytest.mark.parametrize(
