@@ -163,27 +163,18 @@ class Readings:
         rows = zip(PARTS, OF_PARTS, self._start, before, known, strict=True)
         return [Parameter(f"{name} {part}", unit, start, size, mean) for part, unit, start, size, mean in rows]
 
-    def check(self, rest: np.ndarray, motion: State) -> None:
-        """Compare what the fit leaves with what two axes would, each with a place and an angle of its own.
-
-        Args:
-            rest: What the fit leaves, (n_times, 2) [m/s^2].
-            motion: The motion.
+    def free_rest(self, motion: State) -> np.ndarray:
+        """Return what two axes leave, each with a place and an angle of its own, (n_times, 2) [m/s^2].
 
         Raises:
-            InputError: The readings are not those of an accelerometer that moves so.
+            InputError: The readings do not follow the motion.
         """
         name, shown = f"--accelerometer {','.join(self.columns)}", self._curve(self._time)
-        each = np.stack([*_parts(motion.gravity), *_parts(motion.K), np.ones(len(rest))], axis=1)
+        each = np.stack([*_parts(motion.gravity), *_parts(motion.K), np.ones(len(shown))], axis=1)
         free = shown - each @ np.linalg.lstsq(each, shown, rcond=None)[0]
-        if np.mean(free.var(axis=0) / shown.var(axis=0)) > ALIKE:
+        if np.any(free.var(axis=0) >= ALIKE * shown.var(axis=0)):
             raise InputError(f"{name}: does not follow the tilt: are these its columns?")
-        ratio = float(np.max(_size(rest) / _size(free)))
-        if ratio > RIGID:
-            raise InputError(
-                f"{name}: its axes fit {ratio:.2g} times worse together than each by itself: are both columns of one "
-                "accelerometer, with one scale?"
-            )
+        return free
 
     def shown(self, delay: float) -> np.ndarray:
         """Return its readings, low-passed and advanced by its delay, (n_times, 2) [m/s^2]."""
@@ -220,7 +211,8 @@ def _check_rate(motion: Motion, rate: np.ndarray) -> None:
     if motion.slope is None:
         return
     slope, rate = motion.slope - motion.slope.mean(), rate - rate.mean()
-    correlation = float(slope @ rate / math.sqrt((slope @ slope) * (rate @ rate)))
+    power = math.sqrt((slope @ slope) * (rate @ rate))
+    correlation = float(slope @ rate) / power if power else 0.0
     if abs(correlation) < ALIKE:
         raise InputError(
             f"--columns rate, tilt: the rate's correlation with the tilt's derivative is {correlation:.2f}: are these "
@@ -313,6 +305,7 @@ def fit_geometry(signals: Signals) -> Geometry:
 
     found = Geometry(signals, motion, readings, solve(parameters, residuals, share=2.0 / PER_PERIOD))
     state = motion.at(found.errors)
+    free = [one.free_rest(state) for one in readings]
     for number, parameter in zip(found.solution.numbers, parameters, strict=True):
         off = number.value - parameter.known
         if parameter.before in (SCALE, OFFSET) and abs(off) > FAR * parameter.before:
@@ -321,5 +314,10 @@ def fit_geometry(signals: Signals) -> Geometry:
                 f"{parameter.known:g}: is a unit, a column or the angle sensor's --scale wrong?"
             )
     for i, one in enumerate(readings):
-        one.check(found.solution.residuals[:, found.channels_of(i)], state)
+        ratio = float(np.max(_size(found.solution.residuals[:, found.channels_of(i)]) / _size(free[i])))
+        if ratio > RIGID:
+            raise InputError(
+                f"--accelerometer {','.join(one.columns)}: its axes fit {ratio:.2g} times worse together than each by "
+                "itself: are both columns of one accelerometer, with one scale?"
+            )
     return found

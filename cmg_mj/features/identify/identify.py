@@ -12,6 +12,9 @@ from cmg_mj.features.identify.pendulum import fit_pendulum, has_pendulum
 from cmg_mj.features.identify.signals import Signals, below
 from cmg_mj.features.replay.log import Channels
 
+HIGHEST = 0.4
+"""Highest cut-off, in sampling rates."""
+
 
 @dataclass(frozen=True)
 class Identified:
@@ -46,6 +49,12 @@ def identify_rig(channels: Channels, below_hz: float | None = None, momentum: fl
     Raises:
         InputError: The log is too short, or a column, sign or unit is wrong.
     """
+    if below_hz is not None and below_hz * channels.dt > HIGHEST:
+        raise InputError(
+            f"--below-hz {below_hz:g}: at most {HIGHEST / channels.dt:.3g} for rows at {1.0 / channels.dt:.4g} Hz"
+        )
+    if channels.options.radii_m:
+        raise InputError("--radii: this command finds the places; name the columns by --accelerometer")
     signals = Signals(channels, below_hz or below(channels))
     values = channels.values
     if not channels.options.rig.accelerometer and not values.keys() >= {"tilt", "rate"}:

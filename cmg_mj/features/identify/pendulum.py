@@ -17,6 +17,8 @@ STICKS, SPINS = 0.02, 1.0
 """Dry friction turns round over so many rad/s of the body and of a wheel: it is C tanh(rate / STICKS)."""
 MANY, TILTED = 1e3, 0.3
 """Standard deviations of what is known before: so many first estimates, and the equilibrium's tilt [rad]."""
+GAINS = ("inertia J", "torque constant/J", "momentum/J")
+"""Numbers that a torque which does nothing does not tell."""
 UNITS = {"damping": ("N m s", "1/s"), "dry friction": ("N m", "1/s^2"), "J2": ("kg m^2", "")}
 """End of a number's name -> its unit, and that of its ratio to J."""
 
@@ -38,6 +40,7 @@ class Pendulum:
 
     Attributes:
         acceleration: That of the log, (n_times,) [rad/s^2].
+        has_motor: Whether a motor drives it, and not gimbals.
         is_known: Whether the numbers are no ratios.
     """
 
@@ -56,10 +59,10 @@ class Pendulum:
         values, self._time = signals.channels.values, signals.time
         self.acceleration, self._force = -np.imag(state.K), state.gravity / STANDARD_GRAVITY
         self._terms = {"damping": -state.rate, "dry friction": -motion.signs(errors, STICKS)}
-        self._has_motor, self._gain = "torque" in values, 1.0 if momentum is None else momentum
-        if self._has_motor and momentum is not None:
+        self.has_motor, self._gain = "torque" in values, 1.0 if momentum is None else momentum
+        if self.has_motor and momentum is not None:
             raise InputError(f"--momentum {momentum:g}: goes with --columns gimbal=..., not with torque")
-        if self._has_motor:
+        if self.has_motor:
             self._torque = signals.curve(values["torque"])
             self.is_known = signals.channels.options.units["torque"].endswith("n_m")
         else:
@@ -73,12 +76,12 @@ class Pendulum:
             self._terms["wheel's dry friction"] = signals.curve(np.tanh(values["wheel"] / SPINS))(self._time)
 
     def _driven(self, delay: float) -> np.ndarray:
-        return self._torque(self._time - np.clip(delay, -MAX_DELAY_S, MAX_DELAY_S)) if self._has_motor else self._turned
+        return self._torque(self._time - np.clip(delay, -MAX_DELAY_S, MAX_DELAY_S)) if self.has_motor else self._turned
 
     def foretell(self, values: np.ndarray) -> np.ndarray:
         """Return the angular acceleration by the numbers of `parameters`, (n_times,) [rad/s^2]."""
         G, e, last, *others = values
-        delay = others.pop(0) if self._has_motor else 0.0
+        delay = others.pop(0) if self.has_motor else 0.0
         inertia, gain = (last, self._gain) if self.is_known else (1.0, last)
         torque = gain * self._driven(delay) - G * np.real(self._force * np.exp(-1j * e))
         for other, term in zip(others, self._terms.values(), strict=True):
@@ -90,26 +93,26 @@ class Pendulum:
         """The numbers, with linear least squares as a start.
 
         Raises:
-            InputError: The torque turns the body against its sign.
+            InputError: What drives the body does not change.
         """
         rows = [-np.real(self._force), -np.imag(self._force), self._driven(0.0), *self._terms.values()]
         G, aside, gain, *others = np.linalg.lstsq(np.column_stack(rows), self.acceleration, rcond=None)[0].tolist()
-        role = "torque" if self._has_motor else "gimbal"
-        if gain < 0.0:
-            raise InputError(f"--columns {role}: turns the body against its sign: --scale {role}=-1")
+        role = "torque" if self.has_motor else "gimbal"
+        if not self._driven(0.0).any():
+            raise InputError(f"--columns {role}: does not change: is this its column?")
         inertia, per = (self._gain / gain, "") if self.is_known else (1.0, "/J")
-        least = 1e-3 * inertia * gain
+        least = 1e-3 * abs(inertia * gain)
 
         def unknown(name: str, unit: str, start: float) -> Parameter:
             return Parameter(name, unit, start, MANY * max(abs(start), least))
 
-        last = ("torque constant/J", "1/(A s^2)", gain) if self._has_motor else ("momentum/J", "1/s", gain)
+        last = ("torque constant/J", "1/(A s^2)", gain) if self.has_motor else ("momentum/J", "1/s", gain)
         found = [
             unknown(f"m g l{per}", "1/s^2" if per else "N m", inertia * math.copysign(math.hypot(G, aside), G)),
             Parameter("equilibrium", "rad", math.atan(aside / G), TILTED),
             unknown("inertia J", "kg m^2", inertia) if self.is_known else unknown(*last),
         ]
-        if self._has_motor:
+        if self.has_motor:
             found.append(Parameter("torque delay", "s", 0.0, WIDE["s"]))
         for name, other in zip(self._terms, others, strict=True):
             unit = next(units for end, units in UNITS.items() if name.endswith(end))[bool(per)]
@@ -127,7 +130,7 @@ def fit_pendulum(geometry: Geometry, momentum: float | None) -> tuple[Pendulum, 
         momentum: Spin momentum of the flywheels, if it is known [N m s].
 
     Raises:
-        InputError: The torque turns the body against its sign.
+        InputError: The torque does not turn the body, or turns it against its sign.
     """
     names, sensors = list(geometry.errors), geometry.solution
 
@@ -142,6 +145,15 @@ def fit_pendulum(geometry: Geometry, momentum: float | None) -> tuple[Pendulum, 
         )
 
     pendulum, solution = fitted()
+    gain = next(number for number in solution.numbers if number.name in GAINS)
+    role = "torque" if pendulum.has_motor else "gimbal"
+    if gain.error > abs(gain.value):
+        raise InputError(
+            f"--columns {role}: does not move the body beyond chance ({gain.name} = {gain.value:.3g} "
+            f"±{gain.error:.3g}): is this its column?"
+        )
+    if gain.value < 0.0:
+        raise InputError(f"--columns {role}: turns the body against its sign: --scale {role}=-1")
     n = len(names)
     sizes = np.sqrt(np.diag(sensors.covariance)[:n])
     slopes = np.stack([(fitted(i)[1].values - solution.values) / sizes[i] for i in range(n)], axis=1)

@@ -21,6 +21,8 @@ class SimulatedLog(NamedTuple):
     """A log, and what is true."""
 
     channels: Channels
+    values: dict[str, np.ndarray]
+    """The channels' columns, which may be changed."""
     truth: dict[str, float]
 
 
@@ -56,7 +58,7 @@ def simulated_log(
         truth |= {f"accelerometer {number} {part}": float(value) for part, value in zip(PARTS, its, strict=True)}
         placed.append(PlacedAccelerometer(columns=columns, place_m=(0.0, 0.0)))
     options = ReadOptions(units={"torque": "n_m"}, rig=Rig(accelerometer=tuple(placed)))
-    return SimulatedLog(Channels("simulated", dt, values, options, ()), truth)
+    return SimulatedLog(Channels("simulated", dt, values, options, ()), values, truth)
 
 
 def swaying(duration: float, dt: float = 0.01) -> tuple[np.ndarray, np.ndarray]:

@@ -21,9 +21,8 @@ def log(elsewhere: None) -> dict[str, float]:
     for name, seed in (("log", 1), ("other", 2)):
         # The other log has the same rig: the same seed, and another motion.
         time, tilt = swaying(15.0)
-        channels, truth = simulated_log(time, tilt if seed == 1 else tilt[::-1], 1, n_accelerometers=1)
-        values = {"tilt_rad": channels.values["tilt"], "rate_rad_s": channels.values["rate"]}
-        values |= {axis: channels.values[axis] for axis in ("x1", "y1")}
+        channels, columns, truth = simulated_log(time, tilt if seed == 1 else tilt[::-1], 1, n_accelerometers=1)
+        values = {"tilt_rad": columns["tilt"], "rate_rad_s": columns["rate"], "x1": columns["x1"], "y1": columns["y1"]}
         rows = np.column_stack([channels.dt * np.arange(len(values["x1"])), *values.values()])
         np.savetxt(f"{name}.csv", rows, delimiter=",", header="time_s," + ",".join(values), comments="")
     return truth
