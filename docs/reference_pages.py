@@ -763,6 +763,9 @@ COMMANDS: dict[str, Notes] = {
         "replay.md",
     ),
     "replay": Notes("about four seconds for a log of 40 seconds.", (f"cmg-mj replay {LOG} {COLUMNS}",), "replay.md"),
+    "identify": Notes(
+        "about five seconds for a log of 40 seconds.", (f"cmg-mj identify {LOG} {COLUMNS}",), "identify.md"
+    ),
     "mount": Notes(
         "up to a minute, or two seconds with `--quick`.",
         (f"cmg-mj mount {TORSO} -o balanced.xml", "cmg-mj run balanced.toml"),
@@ -789,7 +792,7 @@ NEEDS = {
 """Command -> what must be installed."""
 COMMAND_PAGES = {
     "commands.md": ("run", "compare", "list", "check", "sweep", "tune", "studio"),
-    "commands_tools.md": ("replay", "tune-log", "mount", "export", "plugin", "reproduce", "bench"),
+    "commands_tools.md": ("replay", "tune-log", "identify", "mount", "export", "plugin", "reproduce", "bench"),
 }
 """Page -> its commands."""
 ORDER = [name for names in COMMAND_PAGES.values() for name in names]

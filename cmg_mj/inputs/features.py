@@ -103,6 +103,15 @@ FEATURES = {
             "replay": Command("cmg_mj.features.replay.command:replay", "Replay your own log through every observer.")
         }
     ),
+    "identify": Feature(
+        commands={
+            "identify": Command(
+                "cmg_mj.features.identify.command:identify",
+                "Find places and errors of a rig's sensors from a log.",
+            )
+        },
+        needs=("replay",),
+    ),
     "export": Feature(
         commands={
             "export": Command(

@@ -208,7 +208,22 @@ class Log:
         return replace(self, columns=columns, parts=[part for part in parts if part.stop - part.start > 1])
 
 
-Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "time", "torque"]
+class Channels(NamedTuple):
+    """Columns of a log, evenly sampled, in its longest part without a gap."""
+
+    name: str
+    """Name of the file, without its ending."""
+    dt: float
+    """Sample period [s]."""
+    values: Values
+    """Role, or heading of an accelerometer's axis -> (n,), in SI units and radians."""
+    options: ReadOptions
+    """With the units of all columns."""
+    notes: Sequence[str]
+    """Changes to the rows that were not requested."""
+
+
+Quantity = Literal["angle", "rate", "angular acceleration", "acceleration", "torque", "time"]
 
 _DEG, _TURN = math.pi / 180.0, 2.0 * math.pi
 _RATES = {"rad_s": 1.0, "mrad_s": 1e-3, "deg_s": _DEG, "dps": _DEG, "mdps": 1e-3 * _DEG}
@@ -218,10 +233,10 @@ UNITS: dict[Quantity, dict[str, float]] = {
     "rate": {**_RATES, "rpm": _TURN / 60.0, "rev_s": _TURN},
     "angular acceleration": {"rad_s2": 1.0, "deg_s2": _DEG},
     "acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, **_FORCES},
+    "torque": {"n_m": 1.0, "mn_m": 1e-3, "a": 1.0, "ma": 1e-3},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "torque": {"n_m": 1.0, "mn_m": 1e-3},
 }
-"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2, s or N m. The first of each is that."""
+"""Quantity -> unit -> its size in rad, rad/s, rad/s^2, m/s^2, N m (or A) or s. The first of each is that."""
 _SPELLINGS = {
     "rad": "radian radians",
     "deg": "° degree degrees",
@@ -230,6 +245,7 @@ _SPELLINGS = {
     "rad_s2": "rad_ss",
     "deg_s2": "°_s2",
     "m_s2": "ms2 mps2 m_ss",
+    "n_m": "nm",
     "s": "sec secs second seconds",
     "ms": "msec millis",
     "us": "usec µs μs micros",
@@ -249,17 +265,18 @@ ROLES: dict[str, Quantity] = {
     "gimbal1": "angle",
     "gimbal2": "angle",
     "command": "rate",
-    "torque": "torque",
     "gyro": "rate",
     "rate": "rate",
+    "torque": "torque",
+    "wheel": "rate",
 }
 """Role -> quantity of its column.
 
 `tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
-`gimbal2`, whose half difference it is), `command` their rate, `torque` a known torque that tilts the rig instead of
-gimbals, `gyro` a gyro that observers take, `rate` the reference.
+`gimbal2`, whose half difference it is), `command` their rate, `gyro` a gyro that observers take, `rate` the
+reference, `torque` a motor's torque on the body, or its current, `wheel` the speed of the wheel that it drives.
 """
 
 _ASSIGNMENT = re.compile(

@@ -22,6 +22,7 @@ from cmg_mj.features.replay.log import (
     ONE_ACCELEROMETER,
     REFERENCE,
     TORQUE_MOMENTUM,
+    Channels,
     Log,
     ReadOptions,
     Segment,
@@ -108,6 +109,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             f"{MAX_RADIUS_M:g} m"
         )
     geometry = _geometry(options)
+    if "torque" in columns and not str(columns["torque"].unit).endswith("n_m"):
+        raise InputError("--units torque=a: observers take a torque: --units torque=n_m --scale torque=N_M_PER_A")
     if not abs(options.delay_s) <= MAX_DELAY_S:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
@@ -161,6 +164,31 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             segments, period, dt, 0.0 if geometry is None or geometry.has_angle else geometry.noise().correlation
         ),
     )
+
+
+def read_channels(path: Path | str, options: ReadOptions) -> Channels:
+    """Read a log's columns as they are, evenly sampled, in the longest part without a gap.
+
+    Args:
+        path: A CSV with a heading, or a Parquet file.
+        options: The columns of the file; of its accelerometers only columns and units count.
+
+    Raises:
+        InputError: Something is wrong with the file or the options.
+    """
+    path, notes = Path(path), list[str]()
+    columns = columns_of(options)
+    time, signals = _times(path, read_table(path, columns, options), options)
+    if "tilt" in signals:
+        signals["tilt"] = _unwrapped(signals["tilt"], notes)
+    paced = signals.get("tilt", next(values for values in signals.values()))
+    _, dt, segments = _sample(path, time, {**signals, "y1_rad": paced}, options, MIN_RATE_HZ, notes)
+    longest = max(segments, key=lambda segment: len(segment.time))
+    if len(segments) > 1:
+        start, end = longest.time[[0, -1]] - time[0]
+        notes.append(f"{start:.4g} to {end:.4g} s is used, the longest of {len(segments)} parts without a gap")
+    units = {role: column.unit or "s" for role, column in columns.items() if role in options.columns}
+    return Channels(path.stem, dt, longest.values, replace(options, units=units), notes)
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:

@@ -1,0 +1,70 @@
+"""`cmg-mj identify`: what it prints and writes, and what it says to wrong input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmg_mj.features.replay.rig import load_rig
+from tests.command import ROOT, cmg_mj
+from tests.features.identify.simulated import simulated_log, swaying
+
+COLUMNS = ("--columns", "time=time_s,tilt=tilt_rad,rate=rate_rad_s", "--accelerometer", "x1,y1")
+
+
+@pytest.fixture
+def log(elsewhere: None) -> dict[str, float]:
+    """A log in an empty folder; returns what is true."""
+    for name, seed in (("log", 1), ("other", 2)):
+        # The other log has the same rig: the same seed, and another motion.
+        time, tilt = swaying(15.0)
+        channels, columns, truth = simulated_log(time, tilt if seed == 1 else tilt[::-1], 1, n_accelerometers=1)
+        values = {"tilt_rad": columns["tilt"], "rate_rad_s": columns["rate"], "x1": columns["x1"], "y1": columns["y1"]}
+        rows = np.column_stack([channels.dt * np.arange(len(values["x1"])), *values.values()])
+        np.savetxt(f"{name}.csv", rows, delimiter=",", header="time_s," + ",".join(values), comments="")
+    return truth
+
+
+@pytest.mark.slow
+def test_writes_a_rig_that_replay_takes(log: dict[str, float]) -> None:
+    outcome = cmg_mj("identify", "log.csv", *COLUMNS, "--judge", "other.csv", "--json")
+    assert outcome.err == "cmg-mj: Written to rig.toml. Use it: cmg-mj replay log.csv --rig rig.toml\n"
+    figures = json.loads(outcome.out)
+    up = figures["parameters"]["accelerometer 1 up"]
+    assert up["low"] < log["accelerometer 1 up"] < up["high"]
+    assert figures["r_squared"]["other (judges)"]["angular acceleration by accelerometers and tilt"] > 0.98
+    rig = load_rig("rig.toml")
+    assert rig.accelerometer[0].place_m[1] == pytest.approx(up["value"], rel=1e-5)
+    assert rig.log["scale"]["rate"] == pytest.approx(1.0 / log["gyro scale"], rel=0.05)
+    assert rig.log["delay_s"] == pytest.approx(log["gyro delay"], abs=1e-3)
+    assert Path("rig.png").stat().st_size > 10_000
+    assert cmg_mj("replay", "other.csv", "--rig", "rig.toml", "--observers", "gyro_free", "--json").status == 0
+    again = cmg_mj("identify", "log.csv", *COLUMNS)
+    assert again.complaint == "-o rig.toml: rig.toml exists; give another name, or --overwrite"
+
+
+def test_the_delay_of_a_real_gyro(elsewhere: None) -> None:
+    log = ROOT / "examples/data/stepper_encoder_gyro.csv"
+    columns = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
+    figures = json.loads(cmg_mj("identify", log, "--columns", columns, "--json").out)["parameters"]
+    assert figures["gyro delay"]["value"] == pytest.approx(0.0121, abs=1e-4)  # by correlation: docs/replay.md
+    ratio = figures["tilt scale"]["value"] / figures["gyro scale"]["value"]
+    assert ratio == pytest.approx(1.0157, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--accelerometer", "x1"), "--accelerometer x1: write the headings of its two axes"),
+        (("--accelerometer", "x1,y1", "-o", "rig.txt"), "-o rig.txt: a rig file ends in .toml"),
+        (("-o", "theirs.toml"), "-o theirs.toml: is there, and not by this command: give another name"),
+        (("--accelerometer", "x1,y1", "--columns", "time=time_s"), "--columns: name what shows the motion: tilt"),
+        (("--columns", "time=time_s,tilt=tilt_rad"), "--accelerometer: give the columns of one, or both tilt and rate"),
+    ],
+)
+def test_wrong_input_is_one_line(log: dict[str, float], arguments: tuple[str, ...], complaint: str) -> None:
+    Path("theirs.toml").write_text("a = 1\n")
+    assert cmg_mj("identify", "log.csv", *arguments).complaint.startswith(complaint)
