@@ -19,8 +19,8 @@ def for_worlds(part: Any) -> Any:
     The package's own take arrays. So does a class that says `elementwise = True`, and a law whose `arrays` name
     parameters that differ between worlds.
     """
-    elementwise = type(part).__module__.startswith("cmg_mj.") or getattr(part, "arrays", ())
-    return part if elementwise or getattr(part, "elementwise", False) else OneByOne(part)
+    takes_arrays = type(part).__module__.startswith("cmg_mj.") or getattr(part, "arrays", ())
+    return part if takes_arrays or getattr(part, "elementwise", False) else OneByOne(part)
 
 
 class States(list):

@@ -22,6 +22,7 @@ from cmg_mj.features.replay.log import (
     ONE_ACCELEROMETER,
     REFERENCE,
     TORQUE_MOMENTUM,
+    UNITS,
     Channels,
     Log,
     ReadOptions,
@@ -61,6 +62,8 @@ SAME_TIME = 1e-6
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 1e6
 BALANCED_HZ = 5.0
 """Rate below which nothing balances: milliseconds taken as seconds have at most this, up to 5 kHz [Hz]."""
+MAX_BALANCED_HZ = 2e4
+"""Rate above which no log of such a rig is sampled [Hz]."""
 MAX_SAMPLES = 5_000_000
 """More samples of a log take hours."""
 HELD = "u_rad_s"
@@ -369,9 +372,11 @@ def _sample(
             f"{1e3 * between:.4g} ms between, so their times are not those of the measurements: {cure}"
         )
     if not 1.0 / MAX_RATE_HZ <= period <= 1.0 / slowest:
+        counts = period / UNITS["time"].get(options.units.get("time", "s"), 1.0)
+        fits = [unit for unit, size in UNITS["time"].items() if 1.0 <= 1.0 / (counts * size) <= MAX_BALANCED_HZ]
         raise InputError(
             f"{path}: its rows are {period:.3g} s apart, which is {1.0 / period:.3g} Hz: is the time's unit right? "
-            "Say it, --units time=ms or time=s"
+            f"Say it, --units time={fits[0] if fits else 'ms'}"
         )
     round_rate = float(f"{1.0 / period:.6g}")
     if abs(period * round_rate - 1.0) < 1e-9:
