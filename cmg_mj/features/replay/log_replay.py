@@ -206,8 +206,6 @@ def observer_on(
     takes = OBSERVER_CLASSES.takes(name)
     if "rate_start" in takes and log.scenario is None:
         parameters.setdefault("rate_start", max(takes["rate_start"].default, _rate_of(log)))
-    if "gimbal_white" in takes and "torque" in log.options.columns:
-        parameters.setdefault("gimbal_white", EXACTLY)
     return make_observer(name, log.dt, model or NO_MODEL, noise, **parameters)
 
 
@@ -308,6 +306,8 @@ def observer_inputs(
     if log.scenario is None:
         if model and model.gravity_torque > 0.0:  # the papers' parameters are for their rig
             scaled = {kind: scaled_parameters(kind, model) for kind in OBSERVERS}
+            if "torque" in log.options.columns:
+                scaled["kalman"]["gimbal_white"] = EXACTLY
             parameters = {
                 kind: {**scaled.get(kind, {}), **parameters.get(kind, {})} for kind in {**scaled, **parameters}
             }

@@ -11,6 +11,7 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.log_replay import model_of, replay_prepared
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.replay.rig import Rig, load_rig
@@ -72,3 +73,33 @@ def test_what_a_rig_file_gets_wrong(fields: str, n: int, message: str, tmp_path:
 
 def test_a_rig_without_accelerometers_changes_nothing() -> None:
     assert "rig" not in ReadOptions({"tilt": "a"}, rig=Rig()).as_toml()
+
+
+def pushed_pendulum() -> dict[str, np.ndarray]:
+    """An inverted pendulum of 0.06 kg m^2 and 3.4 N m that a motor holds while it swings, by small steps of Euler's."""
+    y, w, columns, steps = 0.05, 0.0, np.zeros((4, N)), 20
+    for k in range(N):
+        torque = -8.0 * y - 0.3 * w + 0.5 * np.sin(3.0 * T[k])
+        columns[:, k] = T[k], y, w, torque
+        for _ in range(steps):
+            w += DT / steps * (3.4 * np.sin(y) + torque) / 0.06
+            y += DT / steps * w
+    columns[1] += 1e-3 * np.random.default_rng(6).standard_normal(N)
+    return dict(zip(("t_s", "tilt_rad", "gyro_rad_s", "motor_n_m"), columns, strict=True))
+
+
+def test_a_known_torque_moves_the_models_of_observers(tmp_path: Path) -> None:
+    """The wrong sign of it is worse for all of them, and worse than an estimate of zero for none that has the right."""
+    path = write_csv(tmp_path / "log.csv", pushed_pendulum())
+    roles = {"time": "t_s", "tilt": "tilt_rad", "rate": "gyro_rad_s", "torque": "motor_n_m"}
+    errors = []
+    for sign in (1.0, -1.0):
+        log = read_log(path, ReadOptions(roles, scale={"torque": sign}))
+        replayed = replay_prepared(
+            log, ["ltv", "homogeneous", "kalman", "adaptive"], model=model_of("inertia=0.06,gravity_torque=3.4")
+        )
+        errors.append({name: row["velocity_rms_error_rad_s"] for name, row in replayed.summaries.items()})
+    right, wrong = errors
+    for name in ("ltv", "homogeneous", "kalman", "adaptive"):
+        assert right[name] < 0.3 * right["zero"], name
+        assert right[name] < 0.7 * wrong[name], name
