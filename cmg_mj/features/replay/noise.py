@@ -327,7 +327,7 @@ def gyro_noise(log: Log) -> tuple[float, str]:
 
 
 def _without_gyro(log: Log, noises: Mapping[str, float]) -> MeasurementNoise:
-    """Return the noise of a log's sensors that observers assume: the user's, else the log's own, else a default.
+    """Return the noise of a log's sensors that observers assume: the user's, the log's, the rig file's, or a default.
 
     Args:
         log: With two accelerometers, both noises follow from a given density, and the resolution is the bench's.
@@ -342,8 +342,10 @@ def _without_gyro(log: Log, noises: Mapping[str, float]) -> MeasurementNoise:
     shown, gimbal = log.white_noise, Encoder().sample_sigma
     own = {name: noise.sigma for name, noise in shown._asdict().items() if isinstance(noise, WhiteNoise)}
     placed = log.options.rig.accelerometer
-    if log.tilt is not None and all(one.noise_m_s2 for one in placed) and placed:
+    known = log.tilt is not None and placed and all(one.noise_m_s2 for one in placed)
+    if known and not noises and len(own) < 2:
         angle = math.radians(log.options.rig.angle_noise_deg or TILT_NOISE_DEG)
+        assert log.tilt is not None
         return replace(log.tilt.noise(angle), gimbal=gimbal)
     if log.tilt is None or log.tilt.has_angle:
         if "accelerometer" in noises:

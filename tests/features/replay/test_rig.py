@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.log import Log, ReadOptions
+from cmg_mj.features.replay.log import Log, LogNoise, ReadOptions
 from cmg_mj.features.replay.log_replay import model_of, replay_prepared
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reading import read_log
@@ -48,11 +49,13 @@ def test_they_show_tilt_and_angular_acceleration(n: int, columns: dict[str, str]
     np.testing.assert_allclose(log["acceleration_rad_s2"], ALPHA, atol=1e-7)
 
 
-def test_observers_assume_the_noise_that_the_file_states(tmp_path: Path) -> None:
+@pytest.mark.parametrize("n_rows", [N, 800])
+def test_observers_assume_the_logs_noise_or_of_a_short_one_the_files(n_rows: int, tmp_path: Path) -> None:
     log = logged(tmp_path, 2, noise=NOISE)
-    assumed = noise_of(log)
+    assumed = noise_of(log if n_rows == N else replace(log, white_noise=LogNoise("it is short", "it is short", 0.0)))
     assert assumed.tilt == pytest.approx(np.std(log["y1_rad"] - tilt(T)), rel=0.05)
     assert assumed.acceleration == pytest.approx(np.std(log["acceleration_rad_s2"] - ALPHA), rel=0.05)
+    assert noise_of(log, {"accelerometer": 400.0}).tilt < 0.8 * assumed.tilt
 
 
 @pytest.mark.parametrize(
