@@ -6,11 +6,13 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.core.errors import TomlValue
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import law_needs
 from cmg_mj.inputs.features import entries
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
 from cmg_mj.linear.ceiling import ceiling, ceiling_words, plant_words
 from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_gains, omissions, sliding_words
+from cmg_mj.observers.gyro_free import steady_error
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.reports import assignments, lines, number
 from cmg_mj.runs.experiment import Experiment
@@ -54,6 +56,7 @@ def description(name: str, part: Experiment) -> str:
         ("open loop", ", ".join(scenario.open_loop_names()) or "none"),
         ("sensors", ", ".join(f"{kind} {rate:g} Hz" for kind, rate in rates.items())),
         ("", imperfections and f"accelerometer: {assignments(imperfections)}"),
+        ("", _places(design)),
         ("compare", compare and f"{', '.join(compare.names())}; {compare.worlds} worlds"),
         *(("push", push.words) for push in scenario.push),
         *(("swing", swing.words) for swing in scenario.swing),
@@ -64,6 +67,19 @@ def description(name: str, part: Experiment) -> str:
         *(("hint", hint) for judgement in judgements for hint in judgement.hints),
     ]
     return lines(f"{name}{f', axis {axis}' if axis else ''}: valid", rows)
+
+
+def _places(design: Design) -> str:
+    """Say what `gyro_free` errs by with the accelerometers where they are, and with the inner one at the pivot."""
+    rig, sensors, dt = design.rig, design.scenario.sensors, design.law.dt
+    (inner, outer), sigma = rig.tilt.radii, sensors.accelerometer.sample_sigma
+    if not sigma:
+        return ""
+    here, best = (steady_error(tilt.noise(sigma, rig.gravity), dt) for tilt in (rig.tilt, RadialTilt(0.0, outer)))
+    return (
+        f"accelerometers at {inner:.3g} and {outer:.3g} m: by their white noise gyro_free errs by {here:.3g} rad/s, "
+        f"at 0 and {outer:.3g} m by {best:.3g}"
+    )
 
 
 def _pivot_rows(plant: Plant) -> Iterator[tuple[str, str]]:

@@ -7,9 +7,11 @@ unit", Sensors 12(5), 2012, doi:10.3390/s120505310, for one axis and two acceler
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
@@ -17,6 +19,8 @@ from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
+
+_NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
 
 
 class State(NamedTuple):
@@ -138,3 +142,30 @@ def decorrelated(noise: MeasurementNoise, n: float) -> tuple[float, float, float
     """
     c = noise.correlation * noise.tilt / n if n else 0.0
     return c, n**2, noise.tilt**2 * (1.0 - noise.correlation**2)
+
+
+def steady_error(noise: MeasurementNoise, dt: float) -> float:
+    """Return the standard deviation of x2 by the sensors' white noise, once the filter with its defaults has settled.
+
+    The stationary covariance of the filter's own equations: those of p, z, b above, driven by n and the jerk.
+
+    Args:
+        noise: Of tilt and angular acceleration.
+        dt: Sample period [s].
+
+    Returns:
+        The error [rad/s].
+    """
+    from scipy.linalg import block_diag, solve_discrete_are
+
+    own = GyroFree(dt, _NO_MODEL, noise)
+    (c, nn, rest), h, d = own._noise, dt, dt * dt / 6.0
+    F = np.array([[1.0, h, -h * h], [0.0, 1.0, -h], [0.0, 0.0, 1.0]])
+    into, shows = np.array([[-h * h], [-h], [0.0]]), np.array([[1.0, 0.0, -d]])
+    Q = (nn + own.jerk**2) * into @ into.T + np.diag([0.0, 0.0, h * own.bias_walk**2])
+    R = np.array([[(c - d) ** 2 * nn + rest]])
+    P = block_diag(solve_discrete_are(F.T, shows.T, Q, R, s=(c - d) * nn * into), nn)  # of p, z, b, n before a sample
+    e = np.append(shows, c - d)
+    after = P - np.outer(P @ e, P @ e) / (e @ P @ e + rest)
+    x2 = np.array([0.0, 1.0, -h / 2.0, -h / 2.0])
+    return math.sqrt(x2 @ after @ x2)

@@ -10,11 +10,13 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 import cmg_mj
+from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.observers import Measurement
 from cmg_mj.observers.free_pivot import FreePivot
-from cmg_mj.observers.gyro_free import GyroFree, State
+from cmg_mj.observers.gyro_free import GyroFree, State, steady_error
 from tests.observers.double_integrator import INDEPENDENT, C, least_squares, motion, shares_of_y1
 from tests.observers.reference import DT, NOISE, PAPER, run
+from tests.recorded import push_recovery
 
 NEVER: dict[str, Any] = {"innovation_weight": 0.0, "slow_innovation_weight": 0.0} | dict.fromkeys(
     ("gate", "pivot_s", "learn_s", "noise_s"), 1e12
@@ -99,3 +101,29 @@ def test_the_trap_of_the_offset() -> None:
     assert figures(5.0, **no_bias) > 4.0 * result
     for bias_walk in (0.03, 0.3):
         assert 1.2 * result < figures(5.0, steady, bias_walk=bias_walk) < 0.5 * figures(5.0, **no_bias)
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [MeasurementNoise(0.0063, 0.41, 0.87), MeasurementNoise(0.002, 2.5, 0.0), MeasurementNoise(0.04, 2.4, 0.95)],
+)
+def test_its_steady_error_is_that_of_samples_at_rest(noise: MeasurementNoise) -> None:
+    rng, observer, state, rates = np.random.default_rng(8), GyroFree(DT, PAPER, noise), None, []
+    for k in range(1200):
+        v, other = rng.normal(size=(2, 100))
+        n = noise.correlation * v + math.sqrt(1.0 - noise.correlation**2) * other
+        y = Measurement(noise.tilt * v, 0.0 * v, noise.acceleration * n)
+        if not k:
+            state = observer.init(y)
+        state, estimate = observer.step(state, y, 0.0 * v)
+        rates.append(estimate.x2)
+    assert np.sqrt(np.mean(np.square(rates[800:]))) == pytest.approx(steady_error(noise, DT), rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("places", [(0.0672, 0.2015), (0.05, 0.25), (0.1, 0.15)])
+def test_check_foretells_its_error_by_the_accelerometers_places(places: tuple[float, float]) -> None:
+    inner, outer = (f"plant.accelerometer_{n}_m={r}" for n, r in zip(("inner", "outer"), places, strict=True))
+    experiment = push_recovery("seed=170000", "controller.feedback=truth", inner, outer, observer="gyro_free")
+    error = experiment.run_many(8, keep_trajectory=False).mean("velocity_rms_error_rad_s")
+    assert error == pytest.approx(steady_error(experiment.design.constructor_arguments[2], DT), rel=0.05)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from cmg_mj.features.identify.identify import Identified
 from cmg_mj.features.identify.pendulum import Pendulum
 from cmg_mj.features.identify.signals import PER_PERIOD, Signals, floor, spectrum
 from cmg_mj.features.replay.log import UNITS
+from cmg_mj.observers.gyro_free import steady_error
 from cmg_mj.results.summary_keys import SummaryValue
 from cmg_mj.results.tables import Row, Table
 from cmg_mj.view.plots.figure import Line, Panel, Picture, draw
@@ -173,11 +174,28 @@ def tables(rig: Identified, sizes: Mapping[str, float], judged: Mapping[str, Map
     if names:
         shares = [{"name": n, **{log: f"{its[n]:.3f}" for log, its in judged.items()}} for n in names]
         parts.append(Table({"name": "R^2", **{log: log for log in judged}}, shares, "", _cell).rich())
+    parts += [Text(f"By its noise {text}") for text in _expected(rig, sizes)]
     if rig.pendulum is None:
         parts.append(Text("No pendulum: no column is the torque (--columns torque=...) or the gimbals' angle."))
     elif "inertia J" not in {number.name for number in rig.numbers}:
         parts.append(Text("Of the pendulum only ratios are known: give the torque in N m (--units), or --momentum."))
     return Group(*parts)
+
+
+def _expected(rig: Identified, sizes: Mapping[str, float]) -> Iterator[str]:
+    """Say what `gyro_free` errs by with these places and noises, and with two as far apart as the length allows."""
+    found, dt = rig.geometry, rig.signals.channels.dt
+    places = [complex(*found.of(i)[:2]) for i in range(len(found.readings))]
+    sigmas = tuple(sizes[f"accelerometer {i + 1}"] for i in range(len(places)))
+    angle, far = sizes.get("tilt", 0.0), max(map(abs, places), default=0.0)
+    for words, at, noises, has_angle in (
+        ("accelerometers alone", places, sigmas, False),
+        ("accelerometers and angle sensor, the pivot at rest", places, sigmas, True),
+        (f"two accelerometers at the pivot and {far:.3g} m from it", [0j, complex(0.0, far)], sigmas[:1] * 2, False),
+    ):
+        if (angle if has_angle else len(at) > 1) and far:
+            noise = PlanarTilt(tuple(at), noises, STANDARD_GRAVITY, has_angle).noise(angle)
+            yield f"gyro_free errs by {steady_error(noise, dt):.3g} rad/s: {words}."
 
 
 def _cell(row: Row, key: str) -> str:
