@@ -240,3 +240,7 @@ def second_order_step(rows: Coefficients, state: FilterState, y1: Scalar) -> Fil
     (a, b, c, d), (e, f, g, h) = rows
     z1, z2, last = state
     return FilterState(a * z1 + b * z2 + c * last + d * y1, e * z1 + f * z2 + g * last + h * y1, y1)
+
+
+NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
+"""Model for observers that need none: a computation with it gives NaN."""

@@ -15,12 +15,10 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import NO_MODEL, ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
-
-_NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
 
 
 class State(NamedTuple):
@@ -158,7 +156,7 @@ def steady_error(noise: MeasurementNoise, dt: float) -> float:
     """
     from scipy.linalg import block_diag, solve_discrete_are
 
-    own = GyroFree(dt, _NO_MODEL, noise)
+    own = GyroFree(dt, NO_MODEL, noise)
     (c, nn, rest), h, d = own._noise, dt, dt * dt / 6.0
     F = np.array([[1.0, h, -h * h], [0.0, 1.0, -h], [0.0, 0.0, 1.0]])
     into, shows = np.array([[-h * h], [-h], [0.0]]), np.array([[1.0, 0.0, -d]])

@@ -122,7 +122,7 @@ class Motion:
 
 
 class Readings:
-    """What an accelerometer shows, and the line f = A i g exp(i y) + B K + b through it as a start.
+    """Readings of an accelerometer, and the line f = A i g exp(i y) + B K + b through it as a start.
 
     The second axis may point to either side of the first: the side that fits better is taken.
     """

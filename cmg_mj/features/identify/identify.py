@@ -18,7 +18,7 @@ HIGHEST = 0.4
 
 @dataclass(frozen=True)
 class Identified:
-    """What one log tells of a rig.
+    """A rig, as far as one log tells it.
 
     Attributes:
         signals: The log.

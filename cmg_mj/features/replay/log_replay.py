@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cmg_mj.core.errors import InputError, counted, raised
-from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.reduced_model import NO_MODEL, ReducedModel
 from cmg_mj.core.tilt import MeasurementNoise
 from cmg_mj.core.types import STATE_SIGNALS, extra_signals, needs
 from cmg_mj.features.replay.log import REFERENCE, TORQUE_MOMENTUM, Log
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 SETTLE_S = 1.0
 """Default time at the start of each part that is not scored [s]."""
-NO_MODEL = ReducedModel(J1=math.nan, J2=math.nan, J_d=math.nan, omega_d=math.nan, gravity_torque=math.nan)
-"""Model for observers that need none: a computation with it gives NaN."""
 NEEDS_IN_WORDS = {
     "model": "a model (--model)",
     "gimbals": "the gimbal angle and the command (--columns gimbal=...,command=...)",
