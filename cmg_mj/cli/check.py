@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -72,13 +73,17 @@ def description(name: str, part: Experiment) -> str:
 def _places(design: Design) -> str:
     """Say what `gyro_free` errs by with the accelerometers where they are, and with the inner one at the pivot."""
     rig, sensors, dt = design.rig, design.scenario.sensors, design.law.dt
-    (inner, outer), sigma = rig.tilt.radii, sensors.accelerometer.sample_sigma
+    tilt, sigma = rig.tilt, sensors.accelerometer.sample_sigma
     if not sigma:
         return ""
-    here, best = (steady_error(tilt.noise(sigma, rig.gravity), dt) for tilt in (rig.tilt, RadialTilt(0.0, outer)))
+    far = max(math.hypot(r, c) for r, c in zip(tilt.radii, tilt.across, strict=True))
+    here, best = (steady_error(pair.noise(sigma, rig.gravity), dt) for pair in (tilt, RadialTilt(0.0, far)))
+    where = [
+        f"{r:.3g}" if tilt.is_radial else f"({c:.3g}, {r:.3g})" for r, c in zip(tilt.radii, tilt.across, strict=True)
+    ]
     return (
-        f"accelerometers at {inner:.3g} and {outer:.3g} m: by their white noise gyro_free errs by {here:.3g} rad/s, "
-        f"at 0 and {outer:.3g} m by {best:.3g}"
+        f"accelerometers at {' and '.join(where)} m: by their white noise gyro_free errs by {here:.3g} rad/s, "
+        f"at 0 and {far:.3g} m by {best:.3g}"
     )
 
 

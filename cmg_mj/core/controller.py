@@ -225,7 +225,7 @@ class Controller:
             RunStopped: The observer or the law failed, or returned a number that is not finite.
         """
         y1, y2 = self.tilt(*forces), self.gimbal_angle(encoders)
-        acceleration = self.tilt.acceleration(forces[0], forces[2])
+        acceleration = self.tilt.acceleration(*forces)
         if self.coriolis is not None:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,6 +37,8 @@ OUTPUTS = (*STATE_SIGNALS, "u_rad_s")
 """Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
+FORCES = ("inner", "inner_z", "outer", "outer_z")
+"""What the accelerometers show, across and along the radial line."""
 TAKES = (
     *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain"),
     *("kalman", "linear", "linear_high_gain", "ltv", "luenberger", "mems_fused"),
@@ -227,17 +230,19 @@ class ClosedLoop:
         outputs = [*OUTPUTS, *self._estimates, *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
         A, B, C, D = ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
         kept = needed_states(A, C)
-        return A[np.ix_(kept, kept)], B[kept], C[:, kept], D, np.array(self.states)[kept].tolist(), outputs
+        return A[kept][:, kept], B[kept], C[:, kept], D, np.array(self.states)[kept].tolist(), outputs
 
     def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
         """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""
         known, settings = self._design.rig, self._design.scenario.plant
         x1, x2, x3, y1, acceleration, gyro = motion
-        ideal = {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2}
-        for name in ("inner", "outer"):
-            misplaced = 1e-3 * getattr(settings, f"accelerometer_{name}_misplaced_mm")
-            ideal[name] = (getattr(known.tilt, f"r_{name}") + misplaced) * acceleration - known.gravity * y1
-        return ideal
+        true = replace(
+            known.tilt,
+            r_inner=known.tilt.r_inner + 1e-3 * settings.accelerometer_inner_misplaced_mm,
+            r_outer=known.tilt.r_outer + 1e-3 * settings.accelerometer_outer_misplaced_mm,
+        )
+        forces = true.forces(-known.gravity * y1, 0.0 * y1, acceleration)
+        return {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2, **dict(zip(FORCES, forces, strict=True))}
 
     def _second_order(self, name: str, coefficients: Sequence[Sequence[float]], value: np.ndarray) -> np.ndarray:
         """Advance a filter of second order, whose states are a name's 1 and 2."""
@@ -255,7 +260,7 @@ class ClosedLoop:
             measured = [readings["tilt"], y2, 0.0 * before, before]
             estimate = [readings["tilt"], readings["rate"], y2]
         else:
-            y1, acceleration = self._y1_slopes @ np.array([readings["inner"], readings["outer"]])
+            y1, acceleration = self._y1_slopes @ np.array([readings[name] for name in _forces(self._design)])
             y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
             measured = [y1, y2, acceleration, before]
             shown = (
@@ -296,23 +301,28 @@ def _channels(design: Design, true_state: bool) -> list[_Channel]:
             channels += [_Channel(signal, *times) for signal in ("tilt", "rate")]
         else:
             raw = round(1.0 / INSIDE_HZ / timestep) if sensor.bandwidth_hz else 0
-            channels.append(_Channel("inner", *times, raw))
-            channels.append(_Channel("outer", *times, raw, round(sensor.skew_s / timestep)))
+            skew = round(sensor.skew_s / timestep)
+            channels += [_Channel(name, *times, raw, skew * name.startswith("outer")) for name in _forces(design)]
     return channels
 
 
+def _forces(design: Design) -> tuple[str, ...]:
+    """Name the forces of first order: along the ray, gravity is a cosine."""
+    return FORCES[::2] if design.rig.tilt.is_radial else FORCES
+
+
 def _measured_slopes(design: Design) -> np.ndarray:
-    """Return y1 and the angular acceleration by the tangential forces of inner and outer part, (2, 2).
+    """Return y1 and the angular acceleration by `_forces`, (2, n).
 
     Differences of the code that runs, constant errors of the parts among it.
     """
     tilt, gravity = design.rig.tilt, design.rig.gravity
     erring = design.scenario.sensors.accelerometer.constant_errors()
 
-    def measured(inner: float, outer: float) -> np.ndarray:
-        forces = erring((inner, gravity, outer, gravity))
-        return np.array([tilt(*forces), tilt.acceleration(forces[0], forces[2])])
+    def measured(change: np.ndarray) -> np.ndarray:
+        forces = erring((np.array(tilt.forces(0.0, gravity, 0.0)) + change).tolist())
+        return np.array([tilt(*forces), tilt.acceleration(*forces)])
 
     h = 1e-5 * gravity
-    columns = [measured(h, 0.0) - measured(-h, 0.0), measured(0.0, h) - measured(0.0, -h)]
-    return np.transpose(columns) / (2.0 * h)
+    changes = h * np.eye(4)[[FORCES.index(name) for name in _forces(design)]]
+    return np.transpose([measured(change) - measured(-change) for change in changes]) / (2.0 * h)

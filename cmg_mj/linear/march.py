@@ -88,8 +88,7 @@ def march(design: Design, plant: LinearPlant) -> Motion:
                     fell |= ~(np.abs(y1) < fall_angle)  # true where it is not a number
                     squares += np.square([x2, y2])
                     across, radial = -rig.gravity * np.sin(y1 - bias), rig.gravity * np.cos(y1 - bias)
-                    inner, outer = (across + radius * acceleration for radius in (rig.tilt.r_inner, rig.tilt.r_outer))
-                    forces = np.array([inner, radial, outer, radial])
+                    forces = np.array(rig.tilt.forces(across, radial, acceleration))
                     if controller.update(step, IdealReading(forces, [y2], gyro, x2)):
                         u = np.array(controller.gimbal_rate)
                     x = np.where(fell, 0.0, F @ x + G @ np.array([u * np.cos(y2), push]))

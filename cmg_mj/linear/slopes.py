@@ -127,11 +127,11 @@ def _slopes(part: Observer | Law, step: Step, inputs: int, y: Measurement) -> Sl
     (up, down), _ = sides[0]
     J = 0.5 * (up + down)
     kept = needed_states(J[:n, :n], J[n:, :n])
-    cut = np.ix_(np.concatenate([kept, np.ones(len(J) - n, bool)]), np.concatenate([kept, np.ones(inputs, bool)]))
-    J, n = J[cut], int(kept.sum())
+    rows, columns = (np.concatenate([kept, np.ones(more, bool)]) for more in (len(J) - n, inputs))
+    J, n = J[rows][:, columns], int(kept.sum())
     size = np.max(np.abs(J), axis=1, initial=0.0, keepdims=True)
     for pair, share_off in sides:
-        if not all(np.all(np.abs(side[cut] - J) <= share_off * size) for side in pair):
+        if not all(np.all(np.abs(side[rows][:, columns] - J) <= share_off * size) for side in pair):
             raise InputError("has no slope at rest")
     return Slopes(tuple(np.array(names, dtype=object)[kept]), J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:])
 

@@ -18,7 +18,7 @@ from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import IdealReading
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
+from cmg_mj.plant.elements import ACCELEROMETERS, EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP, Line, line_named
@@ -28,6 +28,8 @@ _new = tuple.__new__  # a named tuple's own takes twice as long
 QUARTER_TURN = math.pi / 2.0
 MIN_ARM_M = 1e-4
 """A pivot that moves by less for a tilt of 1 rad is at rest [m]."""
+MOUNTED_DEG = 5.0
+"""A sensor or axis farther off is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
 TURNS_ALIKE = 1e-6
 """A frame whose rate differs from the hinge's by less turns with the hinge."""
 
@@ -42,6 +44,7 @@ class Axis:
         frame: The body that carries its sensors.
         point: A point of the line, in the frame's axes [m].
         direction: Unit vector along the line, in the frame's axes, (3,).
+        up: Unit vector upward at the keyframe, the same way.
         modules: Addresses of its modules.
         reduced: The reduced model.
         radial_tilt: The tilt estimate for its accelerometers.
@@ -58,6 +61,7 @@ class Axis:
     frame: int
     point: np.ndarray
     direction: np.ndarray
+    up: np.ndarray
     modules: tuple[Module, ...]
     reduced: ReducedModel
     radial_tilt: RadialTilt
@@ -192,21 +196,18 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
     else:
         frame, point = int(model.site_bodyid[site]), model.site_pos[site]
         direction = data.xmat[frame].reshape(3, 3).T @ data.site_xmat[site].reshape(3, 3)[:, 1]
-    addresses, radii = [], []
-    for which in ("inner", "outer"):
-        sensor = element_id(model, "sensor", f"{prefix}accelerometer_{which}")
-        arm = model.site_pos[model.sensor_objid[sensor]] - point
-        radii.append(math.hypot(*(arm - (arm @ direction) * direction)))
-        addresses.append(int(model.sensor_adr[sensor]))
+    addresses = [int(model.sensor_adr[element_id(model, "sensor", prefix + name)]) for name in ACCELEROMETERS]
+    up = data.xmat[frame].reshape(3, 3).T @ UP
     axis = Axis(
         name,
         line,
         frame,
         point.copy(),
         direction.copy(),
+        up,
         tuple(_find_module(model, key, line, module) for module in modules),
         ReducedModel(1.0, 0.0, 1.0, 1.0, 1.0),
-        RadialTilt(*radii),
+        _pair(model, prefix, point, direction, up),
         [address + along for address in addresses for along in (0, 2)],
         [int(model.sensor_adr[element_id(model, "sensor", f"{module}/gimbal_encoder")]) for module in modules],
         int(model.sensor_adr[element_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
@@ -260,6 +261,24 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     if not (arm > MIN_ARM_M and abs(about @ upright.rates - 1.0) <= TURNS_ALIKE):
         arm = 0.0  # it is at rest, or the body that carries the hinge turns with the tilt
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
+
+
+def _pair(model: mujoco.MjModel, prefix: str, point: np.ndarray, direction: np.ndarray, up: np.ndarray) -> RadialTilt:
+    """Find where the accelerometers sit; what is off by less than `MOUNTED_DEG` is an inaccuracy, which none knows."""
+    radii, beside, angles = [], [], []
+    across = np.cross(direction, up)
+    for name in ACCELEROMETERS:
+        site = model.sensor_objid[element_id(model, "sensor", prefix + name)]
+        arm = model.site_pos[site] - point
+        r, c = float(arm @ up), float(arm @ across)
+        z = np.empty(3)
+        mujoco.mju_rotVecQuat(z, np.array((0.0, 0.0, 1.0)), model.site_quat[site])
+        angle = math.atan2(-z @ across, z @ up)
+        radial = abs(math.atan2(c, r)) <= math.radians(MOUNTED_DEG)
+        radii.append(math.hypot(*(arm - (arm @ direction) * direction)) if radial else r)
+        beside.append(0.0 if radial else c)
+        angles.append(0.0 if abs(angle) <= math.radians(MOUNTED_DEG) else angle)
+    return RadialTilt(*radii, across=tuple(beside), angles=tuple(angles))
 
 
 def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray, np.ndarray]:

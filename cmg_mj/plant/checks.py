@@ -10,16 +10,14 @@ import numpy as np
 
 from cmg_mj.core.errors import shown
 from cmg_mj.inputs.messages import LARGEST
-from cmg_mj.plant.axis import Axis, ResolvedModel
-from cmg_mj.plant.elements import EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, Module, element_id
+from cmg_mj.plant.axis import MOUNTED_DEG, Axis, ResolvedModel
+from cmg_mj.plant.elements import ACCELEROMETERS, EQUILIBRIUM_KEY, SENSORS, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import wheel_momentum
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import UP, HingeLine
 
 TRUE_DEG = 0.05
 """A keyframe that is off by more is no equilibrium: a tenth of the bias that observers are tried with [deg]."""
-MOUNTED_DEG = 5.0
-"""A sensor or axis farther off is mounted otherwise, not inaccurately: no observer stands so much [deg]."""
 STEPS_S = 1e-6, 0.1
 """Physics steps that a model may ask for [s]."""
 
@@ -142,38 +140,30 @@ class RigChecker:
             yield f"at the keyframe {EQUILIBRIUM_KEY!r} only flywheels may turn, not {', '.join(moving)}"
 
     def _sensors(self, axis: Axis, along: np.ndarray, pivot: np.ndarray, line: np.ndarray) -> Iterator[str]:
-        """Check that they sit on the frame, the accelerometers on the radial line, upright."""
+        """Check that they sit on the frame, with their y axes along the tilt's, the accelerometers apart."""
         model, data = self.model, self.data
         for sensor, kind in SENSORS.items():
-            name, beside, away = axis.prefix + sensor, 0.0, ""
+            name, beside = axis.prefix + sensor, 0.0
             site = model.sensor_objid[element_id(model, "sensor", name)]
             if model.site_bodyid[site] != axis.frame:
                 yield f"sensor {name!r} must be at a site of the body with {axis.prefix + TILT_ELEMENT!r}"
                 continue
             axes = data.site_xmat[site].reshape(3, 3)
             off = _degrees_between(axes[:, 1], along)
-            if kind == "accelerometer":
+            if kind == "accelerometer":  # one that is mounted otherwise, the tilt estimate knows
                 arm = data.site_xpos[site] - pivot
-                off = max(off, _degrees_between(axes[:, 2], arm - (arm @ along) * along))
-                beside, away = _degrees_between(arm, line), " and its z axis pointing away from it"
+                aslant = _degrees_between(axes[:, 2], arm - (arm @ along) * along)
+                beside = max(angle for angle in (aslant, _degrees_between(arm, line), 0.0) if angle <= MOUNTED_DEG)
             if off > MOUNTED_DEG:
-                yield (
-                    f"the site of sensor {name!r} must have its y axis along the tilt axis{away}; it is {off:.3g} deg "
-                    "off"
-                )
-            if beside > MOUNTED_DEG:
-                yield (
-                    f"the site of sensor {name!r} must lie on the radial line, from the tilt axis through the centre "
-                    f"of mass; it lies {beside:.3g} deg beside it"
-                )
-            elif TRUE_DEG < max(off, beside) <= MOUNTED_DEG:
+                yield f"the site of sensor {name!r} must have its y axis along the tilt axis; it is {off:.3g} deg off"
+            elif max(off, beside) > TRUE_DEG:
                 self.hints.append(
                     f"the site of sensor {name!r} is {max(off, beside):.2g} deg off its place, which counts as an "
                     "inaccuracy of the rig"
                 )
-        if not 0.0 < axis.radial_tilt.r_inner < axis.radial_tilt.r_outer:
-            inner, outer, _ = (axis.prefix + sensor for sensor in SENSORS)
-            yield f"{outer} must lie farther from the tilt axis than {inner}"
+        if not axis.radial_tilt.is_apart:
+            inner, outer = (axis.prefix + sensor for sensor in ACCELEROMETERS)
+            yield f"{outer} must lie farther from the tilt axis than {inner}, or beside it"
 
     def _momentum(self, modules: Sequence[Module]) -> None:
         """Check that the flywheels' momenta cancel on a free thrust bearing; else the rig turns with every tilt."""

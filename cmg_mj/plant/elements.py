@@ -15,7 +15,8 @@ TILT_ELEMENT = "tilt"
 """The hinge that a rig tilts about, or the site whose y axis lies along a line that it tilts about."""
 BEND_JOINT = "bend"
 """Joint and body that a frame which bends gets, beside what its file has."""
-SENSORS = {"accelerometer_inner": "accelerometer", "accelerometer_outer": "accelerometer", "fog": "gyro"}
+ACCELEROMETERS = "accelerometer_inner", "accelerometer_outer"
+SENSORS = {**dict.fromkeys(ACCELEROMETERS, "accelerometer"), "fog": "gyro"}
 REQUIRED_ELEMENTS = (
     "a rig needs a joint or a site tilt, the joints MODULE/gimbal, MODULE/flywheel, the actuators MODULE/gimbal_servo, "
     f"MODULE/flywheel_motor, the sensors MODULE/gimbal_encoder, {', '.join(SENSORS)} and the keyframe "

@@ -16,7 +16,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
-from cmg_mj.plant.elements import BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
+from cmg_mj.plant.elements import ACCELEROMETERS, BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.step_limit import largest_step
 from cmg_mj.plant.tilt_line import HingeLine
@@ -142,11 +142,11 @@ def _check_range(model: mujoco.MjModel, actuator: int, rate: float, prefix: str)
 
 
 def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
-    """Move the accelerometers of an axis along the radial line.
+    """Move the accelerometers of an axis in its tilting plane.
 
     Args:
         model: The model, as its file has it.
-        settings: Their distances from the tilt axis, which stay without a value, and their offsets from these.
+        settings: Their places and angles, which stay without a value, and their offsets from these.
         axis: The axis, as its file has it.
         path: The model's file, for messages.
 
@@ -154,30 +154,42 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         The tilt estimate for their new places, as far as it knows them.
 
     Raises:
-        InputError: The outer one is no farther out than the inner one.
+        InputError: They are at one place, or on the radial line in the wrong order.
     """
     height = axis.reduced.pivot_arm if settings.pivot_slides else 0.0  # of the point that is taken to be at rest
     if settings.pivot_slides and not height:
         about = f" of axis {axis.name!r}" if axis.name else ""
         raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
+    filed, across = axis.radial_tilt, np.cross(axis.direction, axis.up)
     known, places = [], []
-    for which, was in (("inner", axis.radial_tilt.r_inner), ("outer", axis.radial_tilt.r_outer)):
-        set_to = getattr(settings, f"accelerometer_{which}_m")
-        known.append(was if set_to is None else set_to)
-        places.append(known[-1] + 1e-3 * getattr(settings, f"accelerometer_{which}_misplaced_mm"))
-        if places[-1] != was:
-            site = model.sensor_objid[element_id(model, "sensor", f"{axis.prefix}accelerometer_{which}")]
-            arm = model.site_pos[site] - axis.point
-            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[-1] / was - 1.0)
-            model.site_sameframe[site] = 0  # should it have stood where the body's frame does
-    if not (known[0] < known[1] and 0.0 < places[0] < places[1]):
+    for name, (r, c), angle in zip(ACCELEROMETERS, filed.places, filed.angles, strict=True):
+        values = (getattr(settings, f"{name}{field}") for field in ("_m", "_across_m", "_angle_deg"))
+        to, beside, turned = (
+            was if x is None else x for x, was in zip(values, (r, c, math.degrees(angle)), strict=True)
+        )
+        known.append((to, beside, angle if turned == math.degrees(angle) else math.radians(turned)))
+        places.append(to + 1e-3 * getattr(settings, f"{name}_misplaced_mm"))
+        site = model.sensor_objid[element_id(model, "sensor", axis.prefix + name)]
+        arm = model.site_pos[site] - axis.point
+        if beside == c == 0.0 and r and places[-1] != r:
+            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[-1] / r - 1.0)
+        elif (places[-1], beside) != (r, c):
+            model.site_pos[site] += (places[-1] - r) * axis.up + (beside - c) * across
+        if known[-1][2] != angle:
+            mujoco.mju_axisAngle2Quat(turn := np.empty(4), axis.direction, angle - known[-1][2])
+            mujoco.mju_mulQuat(model.site_quat[site], turn, model.site_quat[site].copy())
+            mujoco.mju_normalize4(model.site_quat[site])
+        model.site_sameframe[site] = 0  # should it have stood as the body's frame does
+    radii, beside, angles = zip(*known, strict=True)
+    tilt = RadialTilt(*radii, across=beside, angles=angles)
+    if not (tilt.is_apart and replace(tilt, r_inner=places[0], r_outer=places[1]).is_apart):
         changes = {name: value for name, value in settings.changes().items() if name.startswith("accelerometer")}
         raise InputError(
             f"{', '.join(f'plant.{name} = {value:g}' for name, value in changes.items())}: the inner accelerometer "
-            f"must lie nearer to the tilt axis than the outer one, and they are {places[0]:g} and "
+            f"must lie nearer to the tilt axis than the outer one, or beside it, and they are {places[0]:g} and "
             f"{places[1]:g} m away ({path})"
         )
-    return RadialTilt(*known).about(height)
+    return tilt.about(height)
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

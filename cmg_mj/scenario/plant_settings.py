@@ -19,7 +19,11 @@ NEEDS_COMPILING = ("model", "lock_thrust_bearing", "locked_axes")
 Loss = Annotated[NonNegative | None, Batched()]
 """An armature, a friction or a damping that may replace the model's."""
 Tilt = Annotated[float, Field(gt=-45.0, lt=45.0), Batched(), PerAxis()]
-Distance = Annotated[Positive | None, Batched(), PerAxis()]
+Place = Annotated[float, Field(ge=-10.0, le=10.0)]
+"""Millimetres taken as metres are larger [m]."""
+Distance = Annotated[Place | None, Batched(), PerAxis()]
+Across = Annotated[Place | None, PerAxis()]
+Turn = Annotated[Annotated[float, Field(gt=-360.0, lt=360.0)] | None, PerAxis()]
 Misplaced = Annotated[float, Batched(), PerAxis()]
 
 
@@ -44,10 +48,16 @@ class PlantSettings:
         gimbal_backlash_arcmin: Backlash between each gimbal and its servo's motor [arcmin].
         servo_stiffness_n_m_rad: Stiffness of each gimbal servo's position loop [N m/rad].
         servo_damping_n_m_s_rad: Damping of each gimbal servo's position loop [N m s/rad].
-        accelerometer_inner_m: Distance of the inner accelerometer from the tilt axis, which the tilt estimate
-            uses [m].
-        accelerometer_outer_m: Distance of the outer accelerometer from the tilt axis, which the tilt estimate
-            uses [m].
+        accelerometer_inner_m: Distance of the inner accelerometer from the tilt axis along the radial line, which the
+            tilt estimate uses [m].
+        accelerometer_outer_m: Distance of the outer accelerometer from the tilt axis along the radial line, which the
+            tilt estimate uses [m].
+        accelerometer_inner_across_m: Distance of the inner accelerometer from the radial line, on the side that a
+            growing tilt leans to, which the tilt estimate uses [m].
+        accelerometer_outer_across_m: The same of the outer accelerometer [m].
+        accelerometer_inner_angle_deg: Angle of the inner accelerometer's axes in the tilting plane, from across to up,
+            which the tilt estimate uses [deg].
+        accelerometer_outer_angle_deg: The same of the outer accelerometer [deg].
         accelerometer_inner_misplaced_mm: True distance of the inner accelerometer less the distance that the tilt
             estimate uses [mm].
         accelerometer_outer_misplaced_mm: True distance of the outer accelerometer less the distance that the tilt
@@ -76,6 +86,10 @@ class PlantSettings:
     servo_damping_n_m_s_rad: Loss = None
     accelerometer_inner_m: Distance = None
     accelerometer_outer_m: Distance = None
+    accelerometer_inner_across_m: Across = None
+    accelerometer_outer_across_m: Across = None
+    accelerometer_inner_angle_deg: Turn = None
+    accelerometer_outer_angle_deg: Turn = None
     accelerometer_inner_misplaced_mm: Misplaced = 0.0
     accelerometer_outer_misplaced_mm: Misplaced = 0.0
     pivot_slides: Annotated[bool, PerAxis()] = False

@@ -231,7 +231,7 @@ def recorded(rig: Rig, motions: list[np.ndarray], rng: Rng, observer: Observer |
         inner_x, outer_x = inner * alpha + tangential + shaken[0], outer * alpha + tangential + shaken[1]
         inner_z, outer_z = radial - inner * x2 * x2 + shaken[2], radial - outer * x2 * x2 + shaken[3]
         y1 = np.asarray(tilt(inner_x, inner_z, outer_x, outer_z))
-        rows.append((y1, tilt.acceleration(inner_x, outer_x), x2, x1))
+        rows.append((y1, tilt.acceleration(inner_x, 0.0, outer_x, 0.0), x2, x1))
 
         rate = x2
         if observer is not None:

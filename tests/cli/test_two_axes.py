@@ -153,7 +153,7 @@ def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: 
     ("settings", "complaint"),
     [
         (["axes.rol.plant.initial_tilt_deg=1"], "axes = 'rol': the rig has no such axis; did you mean 'roll'"),
-        (["axes.roll.plant.modl=1"], "axes.roll.plant.modl: no such field; allowed: accelerometer_inner_m"),
+        (["axes.roll.plant.modl=1"], "axes.roll.plant.modl: no such field; allowed: accelerometer_inner_a"),
         (["axes.roll.controller.rate_hz=100"], "[axes.roll]: controller.rate_hz: is the same on all axes"),
         (
             ["swing=[{frequency_hz=15.0, axis='roll'}]", "controller.rate_hz=100"],

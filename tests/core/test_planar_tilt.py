@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -42,14 +44,25 @@ def test_the_motion_that_it_was(places: tuple[complex, ...], has_angle: bool, mo
     assert (y.item(), alpha.item()) == pytest.approx((Y, ALPHA))
 
 
-def test_two_on_a_ray_are_the_radial_pair() -> None:
-    planar, radial = PlanarTilt((0.067j, 0.202j), (0.4, 0.4), G), RadialTilt(0.067, 0.202)
-    seen = [f + 0.3 * (RNG.normal(size=9) + 1j * RNG.normal(size=9)) for f in forces(planar.places)]
-    y, alpha = planar(seen)
-    np.testing.assert_allclose(y, radial(*(part for f in seen for part in (f.real, f.imag))))
-    np.testing.assert_allclose(alpha, radial.acceleration(seen[0].real, seen[1].real))
-    ours, theirs = planar.noise(), radial.noise(0.4, G)
-    assert vars(ours) == pytest.approx(vars(theirs))
+PAIRS = [
+    RadialTilt(0.067, 0.202),
+    RadialTilt(0.1656, 0.1607, across=(0.0265, -0.0133)),
+    RadialTilt(-0.05, 0.2, across=(0.0, 0.1), angles=(math.pi / 2.0, -2.0)),
+]
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_two_are_the_pair_of_the_rig(pair: RadialTilt) -> None:
+    planar = PlanarTilt(tuple(c + 1j * r for r, c in pair.places), (0.4, 0.4), G)
+    exact = [np.exp(-1j * angle) * f for f, angle in zip(forces(planar.places), pair.angles, strict=True)]
+    across, up = -G * np.sin(Y), G * np.cos(Y)
+    np.testing.assert_allclose(pair.forces(across, up, ALPHA, RATE), [x for f in exact for x in (*f.real, *f.imag)])
+    seen = [f + 0.3 * (RNG.normal(size=9) + 1j * RNG.normal(size=9)) for f in exact]
+    y, alpha = planar([f * np.exp(1j * angle) for f, angle in zip(seen, pair.angles, strict=True)])
+    of_pair = [part for f in seen for part in (f.real, f.imag)]
+    np.testing.assert_allclose(pair(*of_pair), y)
+    np.testing.assert_allclose(pair.acceleration(*of_pair), alpha)
+    assert vars(pair.noise(0.4, G)) == pytest.approx(vars(planar.noise()))
 
 
 @pytest.mark.parametrize(("places", "has_angle", "moves"), CASES)

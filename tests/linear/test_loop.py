@@ -149,6 +149,11 @@ ALL_AT_ONCE: dict[str, Any] = {
     "sensors__encoder__latency_s": 0.007,
     "plant__accelerometer_outer_misplaced_mm": 2.0,
 }
+BESIDE_THE_LINE = ALL_AT_ONCE | {
+    "sensors__accelerometer__scale_error": (0.0, 0.0),  # there it tilts the rig so far that sines count
+    "plant__accelerometer_inner_across_m": 0.15,
+    "plant__accelerometer_outer_angle_deg": 90.0,
+}
 
 
 @pytest.mark.slow
@@ -160,8 +165,9 @@ ALL_AT_ONCE: dict[str, Any] = {
         {"controller__feedback": "truth", "controller__notch_hz": 40.0},
         {"controller__angle_source": "estimated", "sensors__accelerometer__latency_s": 0.01},
         {"controller__rate_hz": 100.0, "sensors__accelerometer__skew_s": 0.001},
+        BESIDE_THE_LINE,
     ],
-    ids=["sensors", "fog", "notch", "estimated", "slow"],
+    ids=["sensors", "fog", "notch", "estimated", "slow", "beside the line"],
 )
 def test_all_that_a_scenario_has_in_the_loop_is_in_the_system(settings: dict[str, Any]) -> None:
     assert_push_moves_both_alike(settings)

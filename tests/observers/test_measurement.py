@@ -28,7 +28,7 @@ def test_noise_and_correlation_are_those_of_random_readings() -> None:
     rng = np.random.default_rng(1)
     n = 200_000
     ix, iz, ox, oz = sigma * rng.standard_normal((4, n))
-    y1, alpha = tilt_estimate(ix, G + iz, ox, G + oz), tilt_estimate.acceleration(ix, ox)
+    y1, alpha = tilt_estimate(ix, G + iz, ox, G + oz), tilt_estimate.acceleration(ix, 0.0, ox, 0.0)
     noise = tilt_estimate.noise(sigma, G)
     assert y1.std() == pytest.approx(noise.tilt, rel=0.01)
     assert alpha.std() == pytest.approx(noise.acceleration, rel=0.01)

@@ -173,7 +173,7 @@ def test_the_tilt_is_taken_about_the_mass_centre(plant: Plant, known: Plant) -> 
     assert about.r_inner < 0.0 < about.r_outer
     assert about.radii == pytest.approx(tilt.radii, rel=1e-12)
     assert about.noise(0.04, 9.81).tilt < 0.5 * tilt.noise(0.04, 9.81).tilt
-    assert about.acceleration(0.0, 1.0) == pytest.approx(tilt.acceleration(0.0, 1.0), rel=1e-12)
+    assert about.acceleration(0.0, 0.0, 1.0, 0.0) == pytest.approx(tilt.acceleration(0.0, 0.0, 1.0, 0.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("model", ["scissored_pair.xml", pytest.param("two_axes.xml", marks=pytest.mark.slow)])

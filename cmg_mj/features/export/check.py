@@ -56,7 +56,7 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     swings = size / 3.0 * np.sin(np.outer(t, w) + phase)
     tilt, acceleration = swings.sum(axis=1), (-(w**2) * swings).sum(axis=1)
     x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
-    forces = [part for r in (controller.tilt.r_inner, controller.tilt.r_outer) for part in (x + r * acceleration, z)]
+    forces = controller.tilt.forces(x, z, acceleration)
     gimbal = 5.0 * size * np.sin(w[0] * t)
     gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
     encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]

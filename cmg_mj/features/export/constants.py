@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.tilt import RadialTilt
 from cmg_mj.core.types import Observer
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.laws import Law, StateFeedback
@@ -27,7 +29,7 @@ class Constants(NamedTuple):
     """The constants that the measurement, the law and the trim take.
 
     Attributes:
-        of_measure: Radii, then the gimbals' directions, then their zeros.
+        of_measure: Radii, then the gimbals' directions, then their zeros; of accelerometers beside the ray where.
         of_law: The period, the gains, the limit; of a law that is not (8) the limit alone.
         trimmed: Number of updates during which the integrator is trimmed.
         trim_gain: Gain of the trim; see `Trim`.
@@ -54,6 +56,7 @@ def constants_of(controller: Controller) -> Constants:
             Constant("r_outer", tilt.r_outer, f"outer accelerometer from {centre} [m]"),
             *(Constant(f"direction_{i}", sign, f"sign of u that gimbal {i} is given") for i, (sign, _) in numbered),
             *(Constant(f"zero_{i}", zero, f"encoder {i} at a gimbal angle of 0 [rad]") for i, (_, zero) in numbered),
+            *_beside(tilt),
         ],
         of_law=_of_law(controller.law),
         trimmed=-(-trim.until // controller.period),
@@ -61,6 +64,15 @@ def constants_of(controller: Controller) -> Constants:
         trim_part=trim.part,
         gimbals=len(gimbals.directions),
     )
+
+
+def _beside(tilt: RadialTilt) -> Iterator[Constant]:
+    """Yield where accelerometers that are not on the ray lie beside it, and by how much they are turned."""
+    if not tilt.is_radial:
+        for which, across in zip(("inner", "outer"), tilt.across, strict=True):
+            yield Constant(f"across_{which}", across, f"{which} accelerometer beside the radial line [m]")
+        for which, angle in zip(("inner", "outer"), tilt.angles, strict=True):
+            yield Constant(f"angle_{which}", angle, f"{which} accelerometer's axes, turned from across to up [rad]")
 
 
 def _of_law(law: Law) -> list[Constant]:

@@ -115,10 +115,16 @@ def _measure(constants: Constants) -> casadi.Function:
     forces = symbols_named(["inner_x", "inner_z", "outer_x", "outer_z"])
     encoders = symbols_named([f"encoder {i}" for i in range(constants.gimbals)])
     parameters = symbols_named([constant.name for constant in constants.of_measure])
-    inner, outer, *rest = parameters
-    directions, zeros = tuple(rest[: constants.gimbals]), tuple(rest[constants.gimbals :])
-    tilt, gimbal_angle = RadialTilt(inner, outer), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
-    y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(forces[0], forces[2]))
+    n = constants.gimbals
+    inner, outer, directions, zeros = (
+        *parameters[:2],
+        tuple(parameters[2 : 2 + n]),
+        tuple(parameters[2 + n : 2 + 2 * n]),
+    )
+    beside = tuple(parameters[2 + 2 * n :])  # across and angles, if there are any
+    lies = {"across": beside[:2], "angles": beside[2:]} if beside else {}
+    tilt, gimbal_angle = RadialTilt(inner, outer, **lies), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
+    y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(*forces))
     return function_of("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
 
 

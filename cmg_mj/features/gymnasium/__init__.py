@@ -223,7 +223,7 @@ class ScissoredPairEnv(gymnasium.Env):
         tilt = controller.tilt
         extra = {
             MEMS_GYRO: self._read_gyro(np.array([[controller.body_rate]])).item(),
-            "acceleration": tilt.acceleration(forces[0], forces[2]),
+            "acceleration": tilt.acceleration(*forces),
             "fog": fog,
         }
         y = [tilt(*forces), controller.gimbal_angle(encoders), *(extra[name] for name in self._readings)]

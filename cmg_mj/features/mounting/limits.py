@@ -135,11 +135,11 @@ class ReducedPhysics:
         """Compute what perfect sensors show on a rigid body that tilts about a line, which may slide."""
         (x1, x2, x3), tilt, gravity = self.x, self._plant.tilt, self._plant.gravity
         alpha = self._slope(self.x)[1]
-        tangential, radial = gravity * np.sin(x1), gravity * np.cos(x1)
-        forces = np.stack([part for r in tilt.radii for part in (r * alpha - tangential, radial - r * x2 * x2)])
+        across, up = -gravity * np.sin(x1), gravity * np.cos(x1)
         if self._plant.reduced.pivot_arm:
             sliding = self._plant.reduced.pivot_acceleration(x1, x2, alpha)
-            forces = forces + np.stack([sliding * np.cos(x1), sliding * np.sin(x1)] * 2)
+            across, up = across + sliding * np.cos(x1), up + sliding * np.sin(x1)
+        forces = np.stack(tilt.about(-tilt.height).forces(across, up, alpha, x2))
         return IdealReading(forces, [x3.copy()] * self._plant.reduced.gimbals, x2.copy(), x2.copy())
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:

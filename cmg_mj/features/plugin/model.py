@@ -150,8 +150,9 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel
         joint.armature, joint.frictionloss = model.dof_armature[dof], model.dof_frictionloss[dof]
         joint.damping[0] = model.dof_damping[dof]
     for site in spec.sites:
-        if not np.array_equal(drawn.site_pos[site.id], model.site_pos[site.id]):
-            site.pos = model.site_pos[site.id]
+        for name in ("pos", "quat"):
+            if not np.array_equal(getattr(drawn, f"site_{name}")[site.id], getattr(model, f"site_{name}")[site.id]):
+                setattr(site, name, getattr(model, f"site_{name}")[site.id])
     for actuator in spec.actuators:
         actuator.gainprm[:] = model.actuator_gainprm[actuator.id]
         actuator.biasprm[:] = model.actuator_biasprm[actuator.id]

@@ -52,6 +52,9 @@ def test_every_integrator(kind: str, sensors: str) -> None:
         pytest.param(("plant.flywheel_speed_rad_s=250", "plant.flywheel_imbalance_kg_m=1e-6"), id="other wheels"),
         pytest.param(("plant.accelerometer_inner_m=0.1", "plant.accelerometer_outer_m=0.2"), id="other places"),
         pytest.param(
+            ("plant.accelerometer_inner_across_m=0.15", "plant.accelerometer_outer_angle_deg=90"), id="beside the line"
+        ),
+        pytest.param(
             ("plant.accelerometer_inner_misplaced_mm=-3", "plant.accelerometer_outer_misplaced_mm=5"), id="misplaced"
         ),
         pytest.param(("sensors.accelerometer.noise_density_ug_rthz=800",), id="noise"),
