@@ -160,36 +160,44 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     if settings.pivot_slides and not height:
         about = f" of axis {axis.name!r}" if axis.name else ""
         raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
-    filed, across = axis.radial_tilt, np.cross(axis.direction, axis.up)
-    known, places = [], []
-    for name, (r, c), angle in zip(ACCELEROMETERS, filed.places, filed.angles, strict=True):
-        values = (getattr(settings, f"{name}{field}") for field in ("_m", "_across_m", "_angle_deg"))
-        to, beside, turned = (
-            was if x is None else x for x, was in zip(values, (r, c, math.degrees(angle)), strict=True)
-        )
-        known.append((to, beside, angle if turned == math.degrees(angle) else math.radians(turned)))
-        places.append(to + 1e-3 * getattr(settings, f"{name}_misplaced_mm"))
-        site = model.sensor_objid[element_id(model, "sensor", axis.prefix + name)]
-        arm = model.site_pos[site] - axis.point
-        if beside == c == 0.0 and r and places[-1] != r:
-            model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (places[-1] / r - 1.0)
-        elif (places[-1], beside) != (r, c):
-            model.site_pos[site] += (places[-1] - r) * axis.up + (beside - c) * across
-        if known[-1][2] != angle:
-            mujoco.mju_axisAngle2Quat(turn := np.empty(4), axis.direction, angle - known[-1][2])
-            mujoco.mju_mulQuat(model.site_quat[site], turn, model.site_quat[site].copy())
-            mujoco.mju_normalize4(model.site_quat[site])
-        model.site_sameframe[site] = 0  # should it have stood as the body's frame does
+    filed, known, true = axis.radial_tilt, [], []
+    for name, place, angle in zip(ACCELEROMETERS, filed.places, filed.angles, strict=True):
+        r, c = (getattr(settings, f"{name}{field}") for field in ("_m", "_across_m"))
+        turn_deg = getattr(settings, f"{name}_angle_deg")
+        r, c = place[0] if r is None else r, place[1] if c is None else c
+        known.append((r, c, angle if turn_deg is None else math.radians(turn_deg)))
+        true.append(r + 1e-3 * getattr(settings, f"{name}_misplaced_mm"))
+        _move_site(model, axis, axis.prefix + name, (*place, angle), (true[-1], *known[-1][1:]))
     radii, beside, angles = zip(*known, strict=True)
     tilt = RadialTilt(*radii, across=beside, angles=angles)
-    if not (tilt.is_apart and replace(tilt, r_inner=places[0], r_outer=places[1]).is_apart):
+    if not (tilt.is_apart and replace(tilt, r_inner=true[0], r_outer=true[1]).is_apart):
         changes = {name: value for name, value in settings.changes().items() if name.startswith("accelerometer")}
         raise InputError(
             f"{', '.join(f'plant.{name} = {value:g}' for name, value in changes.items())}: the inner accelerometer "
-            f"must lie nearer to the tilt axis than the outer one, or beside it, and they are {places[0]:g} and "
-            f"{places[1]:g} m away ({path})"
+            f"must lie nearer to the tilt axis than the outer one, or beside it, and they are {true[0]:g} and "
+            f"{true[1]:g} m away ({path})"
         )
     return tilt.about(height)
+
+
+def _move_site(
+    model: mujoco.MjModel, axis: Axis, sensor: str, was: tuple[float, float, float], to: tuple[float, float, float]
+) -> None:
+    """Move the site of a sensor to another place along the radial line and across [m], and angle [rad]."""
+    if to == was:
+        return
+    site = model.sensor_objid[element_id(model, "sensor", sensor)]
+    (r, c, angle), (new_r, new_c, new_angle) = was, to
+    if c == new_c == 0.0 and r:
+        arm = model.site_pos[site] - axis.point
+        model.site_pos[site] += (arm - (arm @ axis.direction) * axis.direction) * (new_r / r - 1.0)
+    else:
+        model.site_pos[site] += (new_r - r) * axis.up + (new_c - c) * np.cross(axis.direction, axis.up)
+    if new_angle != angle:
+        mujoco.mju_axisAngle2Quat(turn := np.empty(4), axis.direction, angle - new_angle)
+        mujoco.mju_mulQuat(model.site_quat[site], turn, model.site_quat[site].copy())
+        mujoco.mju_normalize4(model.site_quat[site])
+    model.site_sameframe[site] = 0  # should it have stood as the body's frame does
 
 
 def _vary_servos(model: mujoco.MjModel, settings: PlantSettings, path: Path, modules: Sequence[Module]) -> None:

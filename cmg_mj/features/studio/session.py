@@ -49,6 +49,7 @@ PHYSICS_ARRAYS = (
     "key_ctrl",
     "key_qvel",
     "site_pos",
+    "site_quat",
     "site_sameframe",
     "tendon_invweight0",
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -225,11 +224,10 @@ def log_pushes(rec: rr.RecordingStream, branch: Branch) -> None:
 def _edge(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Find the frame's upper edge on the radial line, and its motion under a positive torque, in the frame's axes."""
     model = plant.drawn_model
-    axis, anchor = plant.axis.direction, plant.axis.point
-    site = model.site_pos[model.sensor(plant.axis.prefix + "accelerometer_outer").objid[0]] - anchor
-    radial = site - axis * (axis @ site)
-    distance = math.sqrt(radial @ radial)
-    radial = radial / distance
-    frame_geoms = model.geom_bodyid == plant.axis.frame
-    height = max([distance, *((model.geom_pos[frame_geoms] - anchor) @ radial).tolist()])
-    return anchor + radial * height, np.cross(axis, radial)
+    anchor, up = plant.axis.point, plant.axis.up
+    places = [
+        model.site_pos[model.site_bodyid == plant.axis.frame],
+        model.geom_pos[model.geom_bodyid == plant.axis.frame],
+    ]
+    height = float(np.max((np.concatenate(places) - anchor) @ up))
+    return anchor + up * height, np.cross(plant.axis.direction, up)
