@@ -36,6 +36,7 @@ def test_double_precision_is_bit_for_bit(kind: str, settings: tuple[str, ...], t
     ("kind", "settings"),
     [
         ("adaptive", ()),
+        ("gyro_free", ("plant.accelerometer_inner_across_m=0.15", "plant.accelerometer_outer_angle_deg=90")),
         pytest.param("linear", (), marks=pytest.mark.slow),
         pytest.param("adaptive", (f"{OWN_LAW}Elaborate",), marks=pytest.mark.slow),
     ],
