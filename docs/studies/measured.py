@@ -1,14 +1,18 @@
-"""Observers on measured logs of a balancer with two accelerometers, two gyros and an angle sensor on one rigid frame.
+"""Observers on measured logs: of a balancer with two accelerometers, two gyros and an angle sensor, and of a pendulum.
 
     git clone https://github.com/AodhAnd/p6-cubli-report
-    python docs/studies/measured.py p6-cubli-report
+    git clone https://github.com/agnieszkaszczesna/RepoIMU
+    python docs/studies/measured.py p6-cubli-report RepoIMU
 
-Half a minute. The rig is identified on the log sensorstestwSimon3 alone. Judged are sensorstestwSimon1, pushed by hand,
-and the second half of sisotool1, in closed loop; the pendulum of the observers with a model is that of its first half.
-Errors are RMS against the mean of both gyros, less their offset [rad/s], from 1 s on; one gyro is judged by the other.
-No parameter is tuned.
+A minute; the second clone may be left out. The rig is identified on the log sensorstestwSimon3 alone. Judged are
+sensorstestwSimon1, pushed by hand, and the second half of sisotool1, in closed loop; the pendulum of the observers with
+a model is that of its first half. Errors are RMS against the mean of both gyros, less their offset [rad/s], from 1 s
+on; one gyro is judged by the other. No parameter is tuned.
 
-The clone is of commit ebfeaa08 (Aalborg University, group 630, 2016). It has no licence, so the logs are not here.
+The first clone is of commit ebfeaa08 (Aalborg University, group 630, 2016), the second of 24145fc4 (A. Szczesna et al.,
+"Reference data set for accuracy evaluation of orientation estimation algorithms for inertial motion capture systems",
+ICCVG 2016): the upper segment of a hanging pendulum with one IMU, its angle by cameras. Its rig is identified on
+Test02a, and judged are two other trials, by the IMU's gyro. Neither has a licence, so the logs are not here.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ TORQUE_N_M_A = -0.0335
 """The motor's torque on the frame by its current [N m/A]."""
 HALF_S = 55.55
 """Middle of the closed loop's log [s]."""
+PENDULUM = "Pendulum/Pendulum_{}_Segment_1.csv"
+TRIALS = {"identified": "Test02a_Trial1", "Test02b": "Test02b_Trial1", "Test03, 2": "Test03_Trial2"}
 HEADINGS = ("count", "tilt", "x1", "y1", "x2", "y2", "gyro1", "gyro2", "mean", "current", "wheel")
 TILT_ALONE = ("linear", "super_twisting", "linear_high_gain")
 MODELS = ("ltv", "homogeneous", "high_gain", "adaptive", "kalman", "luenberger")
@@ -88,11 +94,49 @@ def errors(path: Path, options: ReadOptions, observers: tuple[str, ...]) -> dict
     return found | dict.fromkeys(replayed.left_out, "-")
 
 
+def pendulum_log(path: Path, target: Path) -> float:
+    """Write the rows at which the IMU has a new sample; return the gyro's difference from the slope of the angle."""
+    rows = np.genfromtxt(path, delimiter=";", skip_header=2)
+    rows = rows[np.r_[True, np.any(np.diff(rows[:, 5:11], axis=0) != 0.0, axis=1)]]
+    time, gyro = rows[:, 0] - rows[0, 0], rows[:, 10]
+    angle = np.unwrap(2.0 * np.arctan2(rows[:, 4], rows[:, 1]))  # the pendulum turns about z; x points up
+    table = np.column_stack([time, angle, rows[:, 6], rows[:, 5], gyro])
+    np.savetxt(target, table, delimiter=",", header="time_s,tilt,x1,y1,gyro", comments="")
+    return float(np.std(np.gradient(angle, time) - gyro))
+
+
+def judge_pendulum(clone: Path, folder: Path) -> None:
+    """Print the table of the pendulum."""
+    logs = {name: folder / f"{name}.csv" for name in TRIALS}
+    rest = {name: pendulum_log(clone / PENDULUM.format(TRIALS[name]), logs[name]) for name in TRIALS}
+    placed = PlacedAccelerometer(columns=("x1", "y1"), place_m=(0.0, 0.0))
+    columns, units = {"time": "time_s", "tilt": "tilt", "rate": "gyro"}, {"tilt": "rad", "rate": "rad_s", "time": "s"}
+    options = ReadOptions(columns, units, rig=Rig(accelerometer=(placed,)))
+    rig = rig_of(identify_rig(read_channels(logs.pop("identified"), options)), delays=True)
+    alone, known = replace(options, rig=Rig()), replace(options, rig=rig)
+    rows = []
+    for source, its, observers in (
+        ("nothing", alone, ("zero",)),
+        ("cameras' angle", alone, ("finite_difference", *TILT_ALONE)),
+        ("the same; one accelerometer, the pivot at rest", known, ("gyro_free",)),
+    ):
+        found = {
+            name: errors(log, its, tuple(o for o in observers if o != "zero") or ("linear",))
+            for name, log in logs.items()
+        }
+        rows += [[source, f"`{o}`", *(found[name][o] for name in logs)] for o in observers]
+    rows.append(["", "slope of the angle, afterwards", *(f"{rest[name]:.3f}" for name in logs)])
+    print(markdown_table(["pendulum, from", "observer", *logs], rows))
+    print(f"\nplace: {rig.accelerometer[0].place_m}")
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clone", type=Path)
-    clone = parser.parse_args().clone
+    parser.add_argument("pendulum", type=Path, nargs="?")
+    given = parser.parse_args()
+    clone = given.clone
     files = {"identified": f"{BY_HAND}/sensorstestwSimon3.csv", "by hand": f"{BY_HAND}/sensorstestwSimon1.csv"}
     files["closed loop"] = f"{CLOSED_LOOP}/sisotool1.csv"
     for name in files.values():
@@ -141,7 +185,9 @@ def main() -> None:
                 for o in observers
             ]
         print(markdown_table(["from", "observer", "by hand", "closed loop"], rows))
-        print(f"\nplaces: {[one.place_m for one in rig.accelerometer]}; pendulum: {pendulum}")
+        print(f"\nplaces: {[one.place_m for one in rig.accelerometer]}; pendulum: {pendulum}\n")
+        if given.pendulum:
+            judge_pendulum(given.pendulum, Path(folder))
 
 
 if __name__ == "__main__":
