@@ -30,9 +30,9 @@ from cmg_mj.features.identify.report import noises, rig_fields
 from cmg_mj.features.replay.log import ReadOptions
 from cmg_mj.features.replay.log_replay import replay_prepared
 from cmg_mj.features.replay.reading import read_channels, read_log
-from cmg_mj.features.replay.rig import PlacedAccelerometer, Rig
 from cmg_mj.observers import OBSERVERS
 from cmg_mj.results.tables import markdown_table
+from cmg_mj.scenario.rig_file import PlacedAccelerometer, Rig
 
 BY_HAND, CLOSED_LOOP = "figures/original/Matlab/IMUtest", "CD/Test Files/SISOControllerFinalTest"
 RADIANS, MIDDLE = 1.5769 / (1411.3483 - 2.3893), 640.5645

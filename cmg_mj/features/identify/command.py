@@ -15,7 +15,7 @@ from cmg_mj.features.replay.command import log_options
 
 if TYPE_CHECKING:
     from cmg_mj.features.replay.log import ReadOptions
-    from cmg_mj.features.replay.rig import PlacedAccelerometer
+    from cmg_mj.scenario.rig_file import PlacedAccelerometer
 
 SIGNATURE = "# Written by cmg-mj identify, which may replace this file"
 
@@ -121,7 +121,7 @@ def _check_target(path: Path, picture: Path, *, overwrite: bool) -> None:
 def _unplaced(texts: tuple[str, ...]) -> tuple[PlacedAccelerometer, ...]:
     """Parse `--accelerometer x1,y1,g`."""
     from cmg_mj.features.replay.log import unit_of_name
-    from cmg_mj.features.replay.rig import PlacedAccelerometer
+    from cmg_mj.scenario.rig_file import PlacedAccelerometer
 
     found = []
     for text in texts:

@@ -109,8 +109,8 @@ def log_options(command: Command) -> Command:
     @functools.wraps(command)
     def with_options(**given: Any) -> None:
         from cmg_mj.features.replay.log import ReadOptions, assignments
-        from cmg_mj.features.replay.rig import Rig, load_rig
         from cmg_mj.observers.parameter_options import finite
+        from cmg_mj.scenario.rig_file import Rig, load_rig
 
         options = {field.name: given.pop(field.name) for field in fields(ReadOptions) if field.name in given}
         rig = options["rig"] = Rig() if options["rig"] is None else load_rig(options["rig"])

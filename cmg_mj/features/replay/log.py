@@ -18,9 +18,9 @@ import numpy as np
 from cmg_mj.core.errors import InputError, TomlValue, nearest, shortened
 from cmg_mj.core.planar_tilt import PlanarTilt
 from cmg_mj.core.types import STANDARD_GRAVITY
-from cmg_mj.features.replay.rig import Rig
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.results.trajectory import Trajectory
+from cmg_mj.scenario.rig_file import Rig
 from cmg_mj.stages.push import Window
 
 if TYPE_CHECKING:

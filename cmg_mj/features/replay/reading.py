@@ -32,9 +32,9 @@ from cmg_mj.features.replay.log import (
     read_table,
 )
 from cmg_mj.features.replay.noise import white_noise_of
-from cmg_mj.features.replay.rig import PlacedAccelerometer
 from cmg_mj.results.trajectory import GYRO, Trajectory
 from cmg_mj.scenario.loading import parse_scenario
+from cmg_mj.scenario.rig_file import PlacedAccelerometer
 from cmg_mj.stages.push import Window, inside, push_windows
 
 SAME_PERIOD = 1e-3

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cmg_mj.features.replay.log import Channels, ReadOptions
-from cmg_mj.features.replay.rig import PlacedAccelerometer, Rig
+from cmg_mj.scenario.rig_file import PlacedAccelerometer, Rig
 
 G = 9.80665
 ACCELEROMETER_NOISE = 400e-6 * G * np.sqrt(100.0)

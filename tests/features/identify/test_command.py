@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmg_mj.features.replay.rig import load_rig
+from cmg_mj.scenario.rig_file import load_rig
 from tests.command import ROOT, cmg_mj
 from tests.features.identify.simulated import simulated_log, swaying
 

@@ -15,7 +15,7 @@ from cmg_mj.features.replay.log import Log, LogNoise, ReadOptions
 from cmg_mj.features.replay.log_replay import model_of, replay_prepared
 from cmg_mj.features.replay.noise import noise_of
 from cmg_mj.features.replay.reading import read_log
-from cmg_mj.features.replay.rig import Rig, load_rig
+from cmg_mj.scenario.rig_file import Rig, load_rig
 from tests.features.replay.motion import DT, OMEGA, N, rate, sine, tilt, write_csv
 
 T = DT * np.arange(N)
