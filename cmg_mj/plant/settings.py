@@ -49,8 +49,13 @@ def apply(
         InputError: The body that tilts has no mass of its own to move or no joint for friction; a servo lacks a
             property to change; or a feature does not go together with the rest.
     """
-    path, key, model, speed = rig.path, rig.key, copy.copy(rig.model), settings.flywheel_speed_rad_s
-    held, axes = rig.held, []
+    path, key, held, axes, speed = rig.path, rig.key, rig.held, [], settings.flywheel_speed_rad_s
+    known = _with_pendulum(rig, settings)  # what the controller knows but for the flywheels' speed
+    model = copy.copy(known)
+    if settings.flywheel_momentum_n_m_s is not None:
+        if speed is not None:
+            raise InputError("plant.flywheel_momentum_n_m_s: sets the flywheels' speed; leave flywheel_speed_rad_s out")
+        speed = settings.flywheel_momentum_n_m_s / (rig.axes[0].reduced.J_d * rig.axes[0].reduced.gimbals)
     for axis in rig.axes:
         own = axis_settings.get(axis.name, settings)
         changed = replace(
@@ -62,7 +67,8 @@ def apply(
         )
         if speed is not None:
             changed = replace(changed, modules=_set_flywheel_speed(model, key, axis.modules, speed, path))
-            changed = replace(changed, reduced=read_reduced(rig.model, key, changed))
+        if speed is not None or known is not rig.model:
+            changed = replace(changed, reduced=read_reduced(known, key, changed))
         axes.append(changed)
     if speed is not None:
         held = _set_flywheel_speed(model, key, held, speed, path)
@@ -77,6 +83,31 @@ def apply(
     speeds = [abs(module.speed) for axis in axes for module in axis.modules]
     shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0
     return model, tuple(axes), largest_step(model, key, model.opt.timestep, shake_rate)
+
+
+def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjModel:
+    """Return the model with the inertia about the tilt axis and the torque of gravity that settings ask for."""
+    inertia, torque = settings.tilt_inertia_kg_m2, settings.tilt_gravity_n_m
+    if inertia is None and torque is None:
+        return rig.model
+    if len(rig.axes) > 1:
+        raise InputError(f"plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of one axis, and {rig.path} has several")
+    axis, model = rig.axes[0], copy.copy(rig.model)
+    reduced, mass, moments = axis.reduced, model.body_mass[axis.frame], model.body_inertia[axis.frame]
+    height = float((model.body_ipos[axis.frame] - axis.point) @ axis.up)
+    more = 0.0 if torque is None else torque - reduced.gimbals * reduced.gravity_torque
+    shift = more / (mass * float(np.linalg.norm(model.opt.gravity)))
+    has = reduced.gimbals * reduced.J1 + mass * ((height + shift) ** 2 - height**2)
+    least = has + 2.0 * moments.max() - moments.sum()  # where two principal moments make the third
+    if inertia is not None and inertia < least:
+        raise InputError(
+            f"plant.tilt_inertia_kg_m2 = {inertia:g}: must be at least {least:.4g}, which the masses of {rig.path} "
+            "have where they are"
+        )
+    model.body_ipos[axis.frame] += shift * axis.up
+    model.body_inertia[axis.frame] += 0.0 if inertia is None else inertia - has
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
 def _vary_masses_and_friction(

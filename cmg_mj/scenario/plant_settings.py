@@ -66,6 +66,11 @@ class PlantSettings:
             the accelerometers' distances from the common mass centre instead of the pivot.
         tilt_friction_n_m: Dry friction of the tilt joint [N m].
         tilt_damping_n_m_s: Viscous friction of the tilt joint [N m s/rad].
+        tilt_inertia_kg_m2: Inertia about the tilt axis, the gimbals upright, which the controller knows: the frame gets
+            more or less of it [kg m^2].
+        tilt_gravity_n_m: Torque of gravity at a tilt of 90 deg, which the controller knows: the frame's mass centre is
+            shifted along the radial line [N m].
+        flywheel_momentum_n_m_s: Momentum of an axis' flywheels together, which sets their speed [N m s].
         flywheel_speed_rad_s: Speed of all flywheels, each in its own direction, which the controller uses [rad/s].
         flywheel_imbalance_kg_m: Static imbalance of each flywheel: its mass times the offset of its mass centre [kg m].
     """
@@ -95,6 +100,9 @@ class PlantSettings:
     pivot_slides: Annotated[bool, PerAxis()] = False
     tilt_friction_n_m: Loss = None
     tilt_damping_n_m_s: Loss = None
+    tilt_inertia_kg_m2: Positive | None = None
+    tilt_gravity_n_m: Positive | None = None
+    flywheel_momentum_n_m_s: Positive | None = None
     flywheel_speed_rad_s: Positive | None = None
     flywheel_imbalance_kg_m: Annotated[float, Batched()] = 0.0
 

@@ -140,7 +140,10 @@ def _take_over(spec: mujoco.MjSpec, filed: mujoco.MjModel, drawn: mujoco.MjModel
     spec.option.timestep, spec.option.integrator = model.opt.timestep, model.opt.integrator
     spec.option.disableflags = model.opt.disableflags
     for body in spec.bodies:
-        if not np.array_equal(filed.body_ipos[body.id], model.body_ipos[body.id]):
+        if any(
+            not np.array_equal(getattr(filed, name)[body.id], getattr(model, name)[body.id])
+            for name in ("body_ipos", "body_inertia")
+        ):
             body.explicitinertial = True  # else MuJoCo takes it from the geoms
             body.mass, body.inertia = model.body_mass[body.id], model.body_inertia[body.id]
             body.ipos, body.iquat = model.body_ipos[body.id], model.body_iquat[body.id]

@@ -51,6 +51,7 @@ def test_every_integrator(kind: str, sensors: str) -> None:
         pytest.param(("plant.tilt_friction_n_m=0.01", "plant.gimbal_friction_n_m=0.01"), id="friction"),
         pytest.param(("plant.flywheel_speed_rad_s=250", "plant.flywheel_imbalance_kg_m=1e-6"), id="other wheels"),
         pytest.param(("plant.accelerometer_inner_m=0.1", "plant.accelerometer_outer_m=0.2"), id="other places"),
+        pytest.param(("plant.tilt_inertia_kg_m2=0.2", "plant.flywheel_momentum_n_m_s=0.9"), id="another pendulum"),
         pytest.param(
             ("plant.accelerometer_inner_across_m=0.15", "plant.accelerometer_outer_angle_deg=90"), id="beside the line"
         ),
