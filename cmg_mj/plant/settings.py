@@ -90,7 +90,7 @@ def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjMode
     inertia, torque = settings.tilt_inertia_kg_m2, settings.tilt_gravity_n_m
     if inertia is None and torque is None:
         return rig.model
-    if len(rig.axes) > 1:
+    if rig.axes[1:]:
         raise InputError(f"plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of one axis, and {rig.path} has several")
     axis, model = rig.axes[0], copy.copy(rig.model)
     reduced, mass, moments = axis.reduced, model.body_mass[axis.frame], model.body_inertia[axis.frame]
