@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Command = Callable[..., None]
 Decorator = Callable[[Command], Command]
 
-OVERWRITE = "cmg_mj.overwrite"
+OVERWRITE, RIG = "cmg_mj.overwrite", "cmg_mj.rig"
 MAX_NUMBER = 2**63 - 1
 """Largest seed and number of a world, which tables of results can hold."""
 MAX_WORLDS = 10_000
@@ -88,11 +88,35 @@ def all_of(*decorators: Decorator) -> Decorator:
     return decorate
 
 
-def settings_option(
-    help: str = "Set a field of the scenario, such as plant.initial_tilt_deg=2.0.", metavar: str = "FIELD=VALUE"
-) -> Decorator:
+def settings_option(help: str = "Set a field of the scenario, such as plant.initial_tilt_deg=2.0.") -> Decorator:
+    """Make the option `--set` of a scenario, and `--rig`, whose settings go before."""
+
+    def join(context: click.Context, parameter: click.Parameter, settings: tuple[str, ...]) -> tuple[str, ...]:
+        return (*context.meta.get(RIG, ()), *settings)
+
+    def read(context: click.Context, parameter: click.Parameter, path: str | None) -> None:
+        if path is not None:
+            from cmg_mj.scenario.rig_file import load_rig
+
+            fields = load_rig(path).settings(f"--rig {path}")
+            context.meta[RIG] = [f"{field}={value}" for field, value in fields.items()]
+
+    rig = click.option(
+        "--rig",
+        metavar="FILE",
+        is_eager=True,
+        expose_value=False,
+        callback=read,
+        help="Settings of a rig file, as identify writes it: its accelerometers and its pendulum.",
+    )
+    return all_of(assignments_option(help, "FIELD=VALUE", callback=join), rig)
+
+
+def assignments_option(help: str, metavar: str, **choice: Any) -> Decorator:
     """Make the option `--set`."""
-    return click.option("--set", "settings", multiple=True, metavar=metavar, help=f"{help} May be given again.")
+    return click.option(
+        "--set", "settings", multiple=True, metavar=metavar, help=f"{help} May be given again.", **choice
+    )
 
 
 def worlds_option(help: str, default: int | None = None, range: tuple[int, int] = (1, MAX_WORLDS)) -> Decorator:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.inputs.files import read_toml
 from cmg_mj.inputs.messages import complaints
 from cmg_mj.inputs.types import Positive
@@ -69,6 +70,8 @@ class Rig(BaseModel):
     pivot_moves: bool = False
     angle_noise_deg: Positive | None = None
     """Standard deviation of a sample of the angle sensor."""
+    rate_hz: Positive | None = None
+    """Samples a second, of which the noise is."""
     pendulum: Pendulum | None = None
 
     @property
@@ -78,6 +81,46 @@ class Rig(BaseModel):
             return None
         inertia, gravity_torque, momentum, added = self.pendulum.model_dump().values()
         return ReducedModel(inertia, added, momentum, 1.0, gravity_torque)
+
+    def settings(self, source: str, *, with_pendulum: bool = True) -> dict[str, float]:
+        """Return what a simulated rig can have of it as fields of a scenario.
+
+        These are places, angles, noise and delay of its accelerometers, and the pendulum, if its flywheels have a
+        momentum. Their offsets and scales are those of a log that is not yet corrected, and do not count.
+
+        Args:
+            source: The file, for messages.
+            with_pendulum: Whether the plant gets its pendulum.
+
+        Returns:
+            Field -> value.
+
+        Raises:
+            InputError: It has not two accelerometers, or their noise and no rate.
+        """
+        if len(self.accelerometer) != 2:
+            raise InputError(
+                f"{source}: accelerometer: has {len(self.accelerometer)}; a simulated rig has two and no angle sensor"
+            )
+        placed = sorted(self.accelerometer, key=lambda one: math.hypot(*one.place_m))
+        fields: dict[str, float] = {}
+        for name, one in zip(("inner", "outer"), placed, strict=True):
+            across, up = one.place_m
+            values = {"m": up, "across_m": across, "angle_deg": one.angle_deg}
+            fields |= {f"plant.accelerometer_{name}_{field}": value for field, value in values.items()}
+        noises = [one.noise_m_s2 for one in placed if one.noise_m_s2]
+        if noises:
+            if self.rate_hz is None:
+                raise InputError(f"{source}: rate_hz: give the samples a second, of which noise_m_s2 is")
+            density = math.sqrt(2.0 / self.rate_hz) * math.hypot(*noises) / math.sqrt(len(noises)) / STANDARD_GRAVITY
+            fields["sensors.accelerometer.noise_density_ug_rthz"] = 1e6 * density
+        late = [self.delays_s.get(heading, 0.0) for one in placed for heading in one.columns]
+        fields["sensors.accelerometer.latency_s"] = max(0.0, sum(late) / len(late))
+        if with_pendulum and self.pendulum and self.pendulum.momentum:
+            fields["plant.tilt_inertia_kg_m2"] = self.pendulum.inertia
+            fields["plant.tilt_gravity_n_m"] = self.pendulum.gravity_torque
+            fields["plant.flywheel_momentum_n_m_s"] = self.pendulum.momentum
+        return {field: float(f"{value:.6g}") for field, value in fields.items()}
 
 
 def load_rig(path: Path | str) -> Rig:

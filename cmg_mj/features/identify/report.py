@@ -97,7 +97,7 @@ def rig_fields(rig: Identified, sizes: Mapping[str, float]) -> dict[str, Any]:
     numbers = {number.name: _rounded(number.value) for number in rig.numbers}
     if "torque delay" in numbers:  # the body feels it later
         delays["torque"] = -numbers["torque delay"]
-    rest |= {"delays_s": delays}
+    rest |= {"rate_hz": _rounded(1.0 / found.signals.channels.dt), "delays_s": delays}
     if "inertia J" in numbers:
         rest["pendulum"] = {"inertia": numbers["inertia J"], "gravity_torque": numbers["m g l"]}
         if rig.momentum is not None:

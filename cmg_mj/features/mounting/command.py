@@ -55,6 +55,9 @@ from cmg_mj.cli.terminal import CtrlC, note, note_hints, progress, shell_command
     callback=lambda *arguments: "free" if arguments[-1] else "as_is",
     help="Replace the joints of the robot's root by a free joint.",
 )
+@click.option(
+    "--rig", metavar="FILE", help="Rig file, as identify writes it, whose two accelerometers the scenario gets."
+)
 @observer_option(default="gyro_free")
 @click.option(
     "--plugin",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -16,12 +18,14 @@ from cmg_mj.features.mounting.push import SimulatedPush, TimeLimit, simulated_pu
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
 from cmg_mj.features.plugin.tables import NAMES_IN_USE
 from cmg_mj.inputs.files import expanded
+from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import OBSERVER_CLASSES
 from cmg_mj.observers.scaling import Number, scaled_parameters
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.folder import RunFolder, signed, whole_file
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
+from cmg_mj.scenario.rig_file import load_rig
 
 PUSH_SHARE = 0.6
 """A run is pushed with this share of the push that the robot stands in MuJoCo, or of E if that is not known."""
@@ -87,6 +91,7 @@ def mount_and_write(
     overwrite: bool = False,
     time_limit: TimeLimit | None = None,
     with_plugin: bool = False,
+    rig: str | Path | None = None,
     **request: Any,
 ) -> MountResult:
     """Mount a pair on a robot, find its limits, and write the model with a scenario beside it.
@@ -98,6 +103,7 @@ def mount_and_write(
         overwrite: Whether the files of an earlier mount are replaced. Others never are.
         time_limit: The time to try in MuJoCo what the robot stands; None to leave that out.
         with_plugin: Whether a plugin of MuJoCo is written too, into a folder beside the model.
+        rig: A rig file, whose accelerometers the scenario gets.
         **request: Arguments of `mount`, all of them.
 
     Returns:
@@ -112,16 +118,17 @@ def mount_and_write(
     check_target(file, expanded(robot, "ROBOT"), endings, overwrite=overwrite)
     if with_plugin:
         require_tools()
+    placed = {} if rig is None else load_rig(rig).settings(f"--rig {rig}", with_pendulum=False)
     mounted = mount(robot, **request)
     simulated = plugin = None
     with with_scenario(file) as model:
-        experiment = write_scenario(mounted.save(model), mounted.path, observer, axis=axis)
+        experiment = write_scenario(mounted.save(model), mounted.path, observer, axis=axis, placed=placed)
         if with_plugin:  # what cannot be exported is refused before what takes a minute
             make_plugin(experiment, plugin_name(file), start="spinning")
         limits = push_limits(experiment, axis)
         if time_limit is not None:
             simulated = simulated_push(experiment, limits, axis, time_limit)
-        experiment = write_scenario(model, mounted.path, observer, limits, axis, simulated)
+        experiment = write_scenario(model, mounted.path, observer, limits, axis, simulated, placed)
         if with_plugin:
             made = make_plugin(experiment, plugin_name(file), start="spinning")
             with RunFolder(file.with_name(file.stem + PLUGIN), overwrite=True) as folder:
@@ -138,6 +145,7 @@ def write_scenario(
     limits: PushLimits | None = None,
     axis: str = "",
     simulated: SimulatedPush | None = None,
+    placed: Mapping[str, float] = MappingProxyType({}),
 ) -> Experiment:
     """Write a scenario beside a model that carries a pair.
 
@@ -148,6 +156,7 @@ def write_scenario(
         limits: Limits of the pair, which set the first tilt and the push; without them there is neither.
         axis: Name of the axis that the limits are of.
         simulated: The push that the robot stands in MuJoCo, which then sets the push.
+        placed: Field -> value, of a rig file's accelerometers.
 
     Returns:
         The prepared experiment.
@@ -187,6 +196,8 @@ def write_scenario(
         **({"axes": axes} if axes else {}),
         **({"push": [push]} if largest else {}),
     }
+    for name, value in placed.items():
+        assign(fields, f"axes.{axis}.{name}" if len(names) > 1 else name, value, "--rig")
     path, text = model.with_suffix(".toml"), tomli_w.dumps(fields)
     if parameters:
         header = "\n[axes" if len(names) > 1 else "\n[observer]"

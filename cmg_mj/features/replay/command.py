@@ -12,12 +12,12 @@ import click
 from cmg_mj.cli.arguments import (
     Command,
     all_of,
+    assignments_option,
     claim_output,
     json_option,
     markdown_option,
     observers_option,
     out_option,
-    settings_option,
 )
 from cmg_mj.cli.terminal import (
     CtrlC,
@@ -160,7 +160,7 @@ def span(text: str, option: str) -> tuple[float, float]:
 @click.option("--window", "windows", multiple=True, metavar="START:END", help="Also score this part separately [s].")
 @pendulum_option
 @observers_option()
-@settings_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
+@assignments_option("Set an observer's parameter.", "OBSERVER.NAME=VALUE")
 @noise_option
 @click.option(
     "--settle-s",

@@ -11,13 +11,13 @@ from cmg_mj.cli.arguments import (
     MAX_WORLDS,
     RunArguments,
     all_of,
+    assignments_option,
     claim_output,
     json_option,
     names_in,
     observer_option,
     out_option,
     run_options,
-    settings_option,
     worlds_option,
 )
 from cmg_mj.cli.terminal import (
@@ -143,7 +143,7 @@ def tune(
 )
 @pendulum_option
 @noise_option
-@settings_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
+@assignments_option("Set a parameter to start from and to compare with.", "observer.NAME=VALUE")
 @out_option()
 @json_option()
 @users_code()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,58 @@ def test_writes_a_rig_that_replay_takes(log: dict[str, float]) -> None:
     assert cmg_mj("replay", "other.csv", "--rig", "rig.toml", "--observers", "gyro_free", "--json").status == 0
     again = cmg_mj("identify", "log.csv", *COLUMNS)
     assert again.complaint == "-o rig.toml: rig.toml exists; give another name, or --overwrite"
+
+
+RIG = """rate_hz = 100
+[[accelerometer]]
+columns = ["x1", "y1"]
+place_m = [0.02, 0.165]
+angle_deg = 90
+noise_m_s2 = 0.03
+[[accelerometer]]
+columns = ["x2", "y2"]
+place_m = [-0.03, 0.05]
+noise_m_s2 = 0.04
+[delays_s]
+x1 = 0.004
+y1 = 0.004
+[pendulum]
+inertia = 0.2
+gravity_torque = 8.0
+momentum = 0.6
+"""
+
+
+def test_a_scenario_and_a_robot_take_a_rig_file(elsewhere: None) -> None:
+    """Noise and delay are those of both in the mean."""
+    Path("rig.toml").write_text(RIG)
+    lines = cmg_mj("check", "push_recovery", "--rig", "rig.toml", "--set", "plant.tilt_gravity_n_m=7").out
+    assert "inertia 0.2 kg m^2, gravity 7 N m, momentum 0.6 N m s" in lines
+    assert "accelerometers at (-0.03, 0.05) and (0.02, 0.165) m" in lines
+    robot = ROOT / "examples/robots/torso.xml"
+    cmg_mj("mount", robot, "--body", "torso", "--axis", "x", "--quick", "--rig", "rig.toml")
+    fields = tomllib.loads(Path("balanced.toml").read_text())
+    assert fields["plant"]["accelerometer_outer_angle_deg"] == 90
+    assert "tilt_inertia_kg_m2" not in fields["plant"]
+    density = math.sqrt(0.03**2 + 0.04**2) / math.sqrt(2.0) / math.sqrt(50.0) / 9.80665e-6
+    accelerometer = fields["sensors"]["accelerometer"]
+    assert accelerometer == pytest.approx({"noise_density_ug_rthz": density, "latency_s": 0.002}, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("rate_hz = 100", "", "--rig rig.toml: rate_hz: give the samples a second, of which noise_m_s2 is"),
+        (
+            RIG[RIG.rindex("[[acc") : RIG.index("[del")],
+            "",
+            "--rig rig.toml: accelerometer: has 1; a simulated rig has two",
+        ),
+    ],
+)
+def test_a_rig_that_no_scenario_can_have(elsewhere: None, old: str, new: str, complaint: str) -> None:
+    Path("rig.toml").write_text(RIG.replace(old, new))
+    assert cmg_mj("run", "push_recovery", "--rig", "rig.toml").complaint.startswith(complaint)
 
 
 def test_the_delay_of_a_real_gyro(elsewhere: None) -> None:
