@@ -217,7 +217,7 @@ def check(file: str, settings: tuple[str, ...]) -> None:
 
     is_model = Path(file).suffix.lower() in (".xml", ".mjb")
     if is_model and settings:
-        raise InputError(f"--set {settings[0]}: is for a scenario; {file} is a model")
+        raise InputError(f"--set {settings[0]}: is for a scenario, as --rig is; {file} is a model")
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file, settings)
     describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
     parts = prepare(scenario).axes

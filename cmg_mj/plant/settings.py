@@ -92,6 +92,10 @@ def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjMode
         return rig.model
     if rig.axes[1:]:
         raise InputError(f"plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of one axis, and {rig.path} has several")
+    if element_id(rig.model, "joint", BEND_JOINT) >= 0:
+        raise InputError(
+            "plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of a frame that does not bend; leave [bend] out"
+        )
     axis, model = rig.axes[0], copy.copy(rig.model)
     reduced, mass, moments = axis.reduced, model.body_mass[axis.frame], model.body_inertia[axis.frame]
     height = float((model.body_ipos[axis.frame] - axis.point) @ axis.up)

@@ -98,13 +98,13 @@ class Rig(BaseModel):
         Raises:
             InputError: It has not two accelerometers, or their noise and no rate.
         """
-        if len(self.accelerometer) != 2:
+        if len(self.accelerometer) not in (0, 2):
             raise InputError(
                 f"{source}: accelerometer: has {len(self.accelerometer)}; a simulated rig has two and no angle sensor"
             )
         placed = sorted(self.accelerometer, key=lambda one: math.hypot(*one.place_m))
         fields: dict[str, float] = {}
-        for name, one in zip(("inner", "outer"), placed, strict=True):
+        for name, one in zip(("inner", "outer"), placed, strict=False):
             across, up = one.place_m
             values = {"m": up, "across_m": across, "angle_deg": one.angle_deg}
             fields |= {f"plant.accelerometer_{name}_{field}": value for field, value in values.items()}
@@ -114,8 +114,9 @@ class Rig(BaseModel):
                 raise InputError(f"{source}: rate_hz: give the samples a second, of which noise_m_s2 is")
             density = math.sqrt(2.0 / self.rate_hz) * math.hypot(*noises) / math.sqrt(len(noises)) / STANDARD_GRAVITY
             fields["sensors.accelerometer.noise_density_ug_rthz"] = 1e6 * density
-        late = [self.delays_s.get(heading, 0.0) for one in placed for heading in one.columns]
-        fields["sensors.accelerometer.latency_s"] = max(0.0, sum(late) / len(late))
+        late = [self.delays_s[heading] for one in placed for heading in one.columns if heading in self.delays_s]
+        if late:
+            fields["sensors.accelerometer.latency_s"] = max(0.0, sum(late) / len(late))
         if with_pendulum and self.pendulum and self.pendulum.momentum:
             fields["plant.tilt_inertia_kg_m2"] = self.pendulum.inertia
             fields["plant.tilt_gravity_n_m"] = self.pendulum.gravity_torque

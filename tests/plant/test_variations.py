@@ -173,31 +173,6 @@ def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(by_setting["y1_rad"], run(f"plant.model={path}")["y1_rad"], rtol=0.0, atol=1e-9)
 
 
-def test_a_pendulum_of_other_numbers_falls_as_they_say() -> None:
-    """As the cosine hyperbolic of the time over sqrt(J/(m g l)), while its wheels are at rest."""
-    J, torque, momentum = 0.3, 8.0, 0.5
-    pendulum = {"tilt_inertia_kg_m2": J, "tilt_gravity_n_m": torque, "flywheel_momentum_n_m_s": momentum}
-    start = {"equilibrium_bias_deg": 0.0, "initial_tilt_deg": 0.05, "lock_thrust_bearing": True}
-    plant = load_plant(**pendulum, **start)
-    model, n = plant.reduced, plant.reduced.gimbals
-    found = n * model.J1, n * model.gravity_torque, n * model.J_d * model.omega_d
-    assert found == pytest.approx((J, torque, momentum), rel=1e-9)
-    data, seconds = plant.new_data(), 0.5
-    for module in plant.axis.modules:
-        data.qvel[module.flywheel_dof] = data.ctrl[module.motor] = 0.0
-    for _ in range(round(seconds / plant.timestep)):
-        mujoco.mj_step(plant.model, data)
-    lean = plant.axis.line.lean(data.qpos) / math.radians(0.05)
-    assert lean == pytest.approx(math.cosh(seconds * math.sqrt(torque / J)), rel=1e-4)
-
-
-def test_a_pendulum_lighter_than_its_masses_is_refused() -> None:
-    with pytest.raises(InputError, match=r"tilt_inertia_kg_m2 = 0\.01: must be at least 0\.1037, which the masses of"):
-        load_plant(tilt_inertia_kg_m2=0.01)
-    with pytest.raises(InputError, match=r"of one axis, and .*two_axes\.xml has several"):
-        load_plant(model="two_axes", tilt_gravity_n_m=9.0)
-
-
 ASIDE = {"inner": (0.12, 0.15, 90.0), "outer": (-0.03, -0.02, -100.0)}
 """Up and across from the pivot [m], and the angle from across to the first axis [deg]."""
 BY_SETTINGS = {
