@@ -87,8 +87,7 @@ def apply(
 
 def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjModel:
     """Return the model with the inertia about the tilt axis and the torque of gravity that settings ask for."""
-    inertia, torque = settings.tilt_inertia_kg_m2, settings.tilt_gravity_n_m
-    if inertia is None and torque is None:
+    if settings.tilt_inertia_kg_m2 is None and settings.tilt_gravity_n_m is None:
         return rig.model
     if rig.axes[1:]:
         raise InputError(f"plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of one axis, and {rig.path} has several")
@@ -97,19 +96,20 @@ def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjMode
             "plant.tilt_inertia_kg_m2, plant.tilt_gravity_n_m: of a frame that does not bend; leave [bend] out"
         )
     axis, model = rig.axes[0], copy.copy(rig.model)
-    reduced, mass, moments = axis.reduced, model.body_mass[axis.frame], model.body_inertia[axis.frame]
+    mass, moments = model.body_mass[axis.frame], model.body_inertia[axis.frame]
+    own, own_torque = (axis.reduced.gimbals * share for share in (axis.reduced.J1, axis.reduced.gravity_torque))
+    inertia, torque = settings.tilt_inertia_kg_m2 or own, settings.tilt_gravity_n_m or own_torque
     height = float((model.body_ipos[axis.frame] - axis.point) @ axis.up)
-    more = 0.0 if torque is None else torque - reduced.gimbals * reduced.gravity_torque
-    shift = more / (mass * float(np.linalg.norm(model.opt.gravity)))
-    has = reduced.gimbals * reduced.J1 + mass * ((height + shift) ** 2 - height**2)
+    shift = (torque - own_torque) / (mass * float(np.linalg.norm(model.opt.gravity)))
+    has = own + mass * ((height + shift) ** 2 - height**2)
     least = has + 2.0 * moments.max() - moments.sum()  # where two principal moments make the third
-    if inertia is not None and inertia < least:
+    if inertia < least:
         raise InputError(
             f"plant.tilt_inertia_kg_m2 = {inertia:g}: must be at least {least:.4g}, which the masses of {rig.path} "
             "have where they are"
         )
     model.body_ipos[axis.frame] += shift * axis.up
-    model.body_inertia[axis.frame] += 0.0 if inertia is None else inertia - has
+    model.body_inertia[axis.frame] += inertia - has
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 

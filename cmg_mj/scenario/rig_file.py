@@ -114,8 +114,8 @@ class Rig(BaseModel):
                 raise InputError(f"{source}: rate_hz: give the samples a second, of which noise_m_s2 is")
             density = math.sqrt(2.0 / self.rate_hz) * math.hypot(*noises) / math.sqrt(len(noises)) / STANDARD_GRAVITY
             fields["sensors.accelerometer.noise_density_ug_rthz"] = 1e6 * density
-        late = [self.delays_s[heading] for one in placed for heading in one.columns if heading in self.delays_s]
-        if late:
+        late = [self.delays_s.get(heading, 0.0) for one in placed for heading in one.columns]
+        if any(late):
             fields["sensors.accelerometer.latency_s"] = max(0.0, sum(late) / len(late))
         if with_pendulum and self.pendulum and self.pendulum.momentum:
             fields["plant.tilt_inertia_kg_m2"] = self.pendulum.inertia
