@@ -9,7 +9,7 @@ from .core.errors import InputError as InputError
 from .core.errors import RunStopped as RunStopped
 from .core.reduced_model import ReducedModel as ReducedModel
 from .core.tilt import MeasurementNoise as MeasurementNoise
-from .core.tilt import RadialTilt as RadialTilt
+from .core.tilt import PairTilt as PairTilt
 from .features.export import export as export
 from .features.mounting import MountedRobot as MountedRobot
 from .features.mounting import mount as mount

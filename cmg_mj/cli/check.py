@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping
 
 from cmg_mj.core.errors import TomlValue
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import law_needs
 from cmg_mj.inputs.features import entries
 from cmg_mj.laws import LAWS, TABLE_2_GAINS, StateFeedback
@@ -77,7 +77,7 @@ def _places(design: Design) -> str:
     if not sigma:
         return ""
     far = max(math.hypot(r, c) for r, c in zip(tilt.radii, tilt.across, strict=True))
-    here, best = (steady_error(pair.noise(sigma, rig.gravity), dt) for pair in (tilt, RadialTilt(0.0, far)))
+    here, best = (steady_error(pair.noise(sigma, rig.gravity), dt) for pair in (tilt, PairTilt(0.0, far)))
     where = [
         f"{r:.3g}" if tilt.is_radial else f"({c:.3g}, {r:.3g})" for r, c in zip(tilt.radii, tilt.across, strict=True)
     ]

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import whole_steps
-from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.tilt import GimbalAngle, PairTilt
 from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state, reads_gyro
 
 Feedback = Literal["observer", "fog", "truth"]
@@ -50,7 +50,7 @@ It outlives a reset, and so has no memory of its own.
 class KnownPlant(NamedTuple):
     """The plant's properties that its controller knows."""
 
-    tilt: RadialTilt
+    tilt: PairTilt
     """The tilt from its accelerometers."""
     gimbal_angle: GimbalAngle
     """y2 from its encoders: directions and zeros of the gimbals."""

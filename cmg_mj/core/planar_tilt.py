@@ -24,7 +24,7 @@ class PlanarTilt:
     accelerometers, weighed by 1/sigma^2, are the best unbiased linear estimate of both (Gauss and Markov; A. C. Aitken,
     "On least squares and linear combination of observations", Proc. Royal Society of Edinburgh 55, 1935). y is the
     angle of the intercept, y'' the imaginary part of -K, and y'^2 is not used. Two accelerometers on a ray from the
-    pivot are `RadialTilt`.
+    pivot are `PairTilt`.
 
     Where an angle sensor shows y, the intercept is known. If moreover the pivot is at rest, one accelerometer suffices:
     the line goes through i g exp(i y). Otherwise the slope is the accelerometers' alone.

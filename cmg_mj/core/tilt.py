@@ -42,7 +42,7 @@ class MeasurementNoise:
 
 
 @dataclass(frozen=True)
-class RadialTilt:
+class PairTilt:
     """Two accelerometers at distances r_inner < r_outer from the pivot, on one ray, or beside it.
 
     A body turning about a fixed point moves a point r n of that ray with the acceleration r W n, W the
@@ -70,7 +70,7 @@ class RadialTilt:
     across: tuple[Scalar, Scalar] = (0.0, 0.0)
     angles: tuple[Scalar, Scalar] = (0.0, 0.0)
 
-    def about(self, height: float) -> RadialTilt:
+    def about(self, height: float) -> PairTilt:
         """Return the estimate with distances from a point of the ray above the pivot [m]."""
         if not height:
             return self

@@ -83,7 +83,7 @@ def linearise(plant: Plant, *, rigid: bool = False, height: float | None = None)
     n = len(whole)
     if rigid:
         whole = _without_bend(model, key, whole)
-    outputs = _outputs(plant, whole, axis.radial_tilt.height if height is None else height)
+    outputs = _outputs(plant, whole, axis.pair_tilt.height if height is None else height)
     return LinearPlant(whole[:, :n], whole[:, n:], outputs[:, :n], outputs[:, n:])
 
 

@@ -281,7 +281,7 @@ def sliding_words(plant: Plant) -> str:
     arm = plant.reduced.pivot_arm
     if not arm:
         return ""
-    if plant.radial_tilt.height:
+    if plant.pair_tilt.height:
         return f"slides; the tilt is taken about the common mass centre, {arm:.3g} m above it, which stays where it is"
     return f"slides, and the tilt is taken about it: {measured_words(plant)}"
 
@@ -303,7 +303,7 @@ def _sliding_hint(scenario: Scenario, law: object, plant: Plant) -> str | None:
         return None
     measured = scenario.controller.angle_source == "measured"
     poles = sliding_poles(law, plant) if measured else None
-    if plant.radial_tilt.height:
+    if plant.pair_tilt.height:
         if poles is None or poles.about_centre < -MARGIN:
             return None
         return f"the pivot slides, {_UNKNOWN}: the loop is {loop_words(poles.about_centre)} {_FED}"

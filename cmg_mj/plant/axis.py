@@ -16,7 +16,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.elements import ACCELEROMETERS, EQUILIBRIUM_KEY, TILT_ELEMENT, Module, element_id
 from cmg_mj.plant.inertia import inertia_about
@@ -47,7 +47,7 @@ class Axis:
         up: Unit vector upward at the keyframe, the same way.
         modules: Addresses of its modules.
         reduced: The reduced model.
-        radial_tilt: The tilt estimate for its accelerometers.
+        pair_tilt: The tilt estimate for its accelerometers.
         forces: Addresses in sensordata of inner x, inner z, outer x, outer z.
         encoders: Addresses in sensordata of the gimbals' encoders.
         gyro: Address in sensordata of the gyro along the line.
@@ -64,7 +64,7 @@ class Axis:
     up: np.ndarray
     modules: tuple[Module, ...]
     reduced: ReducedModel
-    radial_tilt: RadialTilt
+    pair_tilt: PairTilt
     forces: list[int]
     encoders: list[int]
     gyro: int
@@ -263,7 +263,7 @@ def read_reduced(model: mujoco.MjModel, key: int, axis: Axis) -> ReducedModel:
     return ReducedModel(float(J1), float(J2), float(J_d), float(momentum / (n * J_d)), float(gravity_torque), n, arm)
 
 
-def _pair(model: mujoco.MjModel, prefix: str, point: np.ndarray, direction: np.ndarray, up: np.ndarray) -> RadialTilt:
+def _pair(model: mujoco.MjModel, prefix: str, point: np.ndarray, direction: np.ndarray, up: np.ndarray) -> PairTilt:
     """Find where the accelerometers sit; what is off by less than `MOUNTED_DEG` is an inaccuracy, which none knows."""
     radii, beside, angles = [], [], []
     across = np.cross(direction, up)
@@ -278,7 +278,7 @@ def _pair(model: mujoco.MjModel, prefix: str, point: np.ndarray, direction: np.n
         radii.append(math.hypot(*(arm - (arm @ direction) * direction)) if radial else r)
         beside.append(0.0 if radial else c)
         angles.append(0.0 if abs(angle) <= math.radians(MOUNTED_DEG) else angle)
-    return RadialTilt(*radii, across=tuple(beside), angles=tuple(angles))
+    return PairTilt(*radii, across=tuple(beside), angles=tuple(angles))
 
 
 def pivot_rows(model: mujoco.MjModel, key: int, axis: Axis) -> tuple[np.ndarray, np.ndarray]:

@@ -161,7 +161,7 @@ class RigChecker:
                     f"the site of sensor {name!r} is {max(off, beside):.2g} deg off its place, which counts as an "
                     "inaccuracy of the rig"
                 )
-        if not axis.radial_tilt.is_apart:
+        if not axis.pair_tilt.is_apart:
             inner, outer = (axis.prefix + sensor for sensor in ACCELEROMETERS)
             yield f"{outer} must lie farther from the tilt axis than {inner}, or beside it"
 

@@ -20,7 +20,7 @@ from cmg_mj.core.controller import KnownPlant
 from cmg_mj.core.errors import InputError, TomlValue, nearest
 from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.tilt import GimbalAngle, PairTilt
 from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.files import find, folder
@@ -190,9 +190,9 @@ class Plant:
         return self.axis.reduced
 
     @property
-    def radial_tilt(self) -> RadialTilt:
+    def pair_tilt(self) -> PairTilt:
         """The tilt estimate for the accelerometers of the axis."""
-        return self.axis.radial_tilt
+        return self.axis.pair_tilt
 
     @property
     def bias(self) -> float:
@@ -236,14 +236,14 @@ class Plant:
         Returns:
             The bias at the equilibrium [rad].
         """
-        return self.bias - self.radial_tilt.offset(-self.bias, accelerometer.constant_errors(), self.gravity)
+        return self.bias - self.pair_tilt.offset(-self.bias, accelerometer.constant_errors(), self.gravity)
 
     @property
     def interface(self) -> KnownPlant:
         """The plant as a controller of the axis knows it."""
         zeros = tuple(module.gimbal_zero for module in self.axis.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
-        return KnownPlant(self.radial_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
+        return KnownPlant(self.pair_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
 
     @property
     def timestep(self) -> float:
@@ -259,7 +259,7 @@ class Plant:
     def parameters(self) -> PlantNumbers:
         """Parameters from which a scenario's controller and observers are made."""
         names = tuple(module.name for module in self.axis.modules)
-        numbers = self.reduced, self.radial_tilt, self.gravity, self.timestep, self.largest_step
+        numbers = self.reduced, self.pair_tilt, self.gravity, self.timestep, self.largest_step
         return PlantNumbers(self.path, names, *numbers, self.hints)
 
     def initialise(self, data: mujoco.MjData) -> None:

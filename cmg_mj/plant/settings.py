@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
 from cmg_mj.plant.elements import ACCELEROMETERS, BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
@@ -62,7 +62,7 @@ def apply(
             axis,
             bias=math.radians(own.equilibrium_bias_deg),
             initial_tilt=math.radians(own.initial_tilt_deg),
-            radial_tilt=place_accelerometers(model, own, axis, path),
+            pair_tilt=place_accelerometers(model, own, axis, path),
             misplaced=bool(own.accelerometer_inner_misplaced_mm or own.accelerometer_outer_misplaced_mm),
         )
         if speed is not None:
@@ -176,7 +176,7 @@ def _check_range(model: mujoco.MjModel, actuator: int, rate: float, prefix: str)
         raise InputError(f"{prefix}: actuator {name!r} takes only {low:g} to {high:g} rad/s (ctrlrange)")
 
 
-def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> RadialTilt:
+def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: Axis, path: Path) -> PairTilt:
     """Move the accelerometers of an axis in its tilting plane.
 
     Args:
@@ -195,7 +195,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
     if settings.pivot_slides and not height:
         about = f" of axis {axis.name!r}" if axis.name else ""
         raise InputError(f"plant.pivot_slides = true: {path}: the pivot{about} does not slide freely; leave it out")
-    filed, known, true = axis.radial_tilt, [], []
+    filed, known, true = axis.pair_tilt, [], []
     for name, place, angle in zip(ACCELEROMETERS, filed.places, filed.angles, strict=True):
         r, c = (getattr(settings, f"{name}{field}") for field in ("_m", "_across_m"))
         turn_deg = getattr(settings, f"{name}_angle_deg")
@@ -204,7 +204,7 @@ def place_accelerometers(model: mujoco.MjModel, settings: PlantSettings, axis: A
         true.append(r + 1e-3 * getattr(settings, f"{name}_misplaced_mm"))
         _move_site(model, axis, axis.prefix + name, (*place, angle), (true[-1], *known[-1][1:]))
     radii, beside, angles = zip(*known, strict=True)
-    tilt = RadialTilt(*radii, across=beside, angles=angles)
+    tilt = PairTilt(*radii, across=beside, angles=angles)
     if not (tilt.is_apart and replace(tilt, r_inner=true[0], r_outer=true[1]).is_apart):
         changes = {name: value for name, value in settings.changes().items() if name.startswith("accelerometer")}
         raise InputError(

@@ -531,7 +531,7 @@ def run_batch(
     for i, part in enumerate(first.axes):
         parts = [experiment.axes[i] for experiment in experiments]
         law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
-        tilt = stack_worlds([plant.axes[i].radial_tilt for plant in plants])
+        tilt = stack_worlds([plant.axes[i].pair_tilt for plant in plants])
         servos = backlash(stack_worlds([plant.backlash for plant in plants]))
         controllers.append(
             part.design.controller(

@@ -65,7 +65,7 @@ class TickRecorder:
         unmodelled = any(part.unmodelled for parts in outside.values() for part in parts)
         acceleration_floors = []
         for noise, (plant, sensor) in zip(noises, pairs, strict=True):
-            slides = plant.radial_tilt.height != plant.reduced.pivot_arm
+            slides = plant.pair_tilt.height != plant.reduced.pivot_arm
             other = unmodelled or sensor.accelerometer.vibrates or plant.axis.misplaced or plant.bends or slides
             acceleration_floors.append(None if other else acceleration_floor(noise, y1_period))
         rates = [name for name in RATES if name not in observers]  # an observer is its own baseline

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypedDict, Unpack
 from cmg_mj.core.controller import AngleSource, Controller, Feedback, KnownPlant
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
+from cmg_mj.core.tilt import MeasurementNoise, PairTilt
 from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
 from cmg_mj.laws import LAW_CLASSES, LAWS, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
@@ -170,7 +170,7 @@ class PlantNumbers(NamedTuple):
     path: Path
     modules: tuple[str, ...]
     reduced: ReducedModel
-    tilt: RadialTilt
+    tilt: PairTilt
     gravity: float
     timestep: float
     largest_step: float

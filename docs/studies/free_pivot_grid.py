@@ -217,7 +217,7 @@ def open_loop(cell: Cell, seed: int, worlds: int) -> OpenLoop:
     vibration = setup.scenario.sensors.accelerometer.vibration_mg
     if vibration:
         sigma = 1e-3 * vibration * gravity
-        noise = with_white(noise, setup.plant.radial_tilt.noise(sigma, gravity))
+        noise = with_white(noise, setup.plant.pair_tilt.noise(sigma, gravity))
     start_at = {"offset": GyroFree.bias_start, "rate": GyroFree.rate_start}
     bound = matched_bound(noise, dt, cell.motion, gravity, **start_at)
     return OpenLoop(errors, start, settled, bound, by_told)

@@ -26,7 +26,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.tilt import MeasurementNoise, RadialTilt
+from cmg_mj.core.tilt import MeasurementNoise, PairTilt
 from cmg_mj.core.types import Estimate, Measurement, Observer
 from cmg_mj.observers.free_pivot import FreePivot
 from cmg_mj.observers.gyro_free import GyroFree
@@ -201,7 +201,7 @@ class Rig(NamedTuple):
 
     model: ReducedModel
     noise: MeasurementNoise
-    tilt: RadialTilt
+    tilt: PairTilt
     gravity: float
 
 
@@ -338,7 +338,7 @@ def known_rig() -> Rig:
     """The rig of push_recovery."""
     setup = prepare(load_scenario("push_recovery", [], "gyro_free"))
     _, model, noise = setup.design.constructor_arguments
-    return Rig(model, noise, setup.plant.radial_tilt, setup.plant.gravity)
+    return Rig(model, noise, setup.plant.pair_tilt, setup.plant.gravity)
 
 
 def record(rig: Rig, name: str, worlds: int, seed: int, observer: Observer | None = None) -> Recording:

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import mujoco
 
 from cmg_mj import mount
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.features.mounting.limits import PushLimits, push_limits
 from cmg_mj.features.mounting.write import write_scenario
 from cmg_mj.results.tables import markdown_table
@@ -77,7 +77,7 @@ def standing(
     if off:
         plant = loop_experiment.plant
         plant.axes = tuple(
-            replace(axis, radial_tilt=RadialTilt(*axis.radial_tilt.radii).about(axis.radial_tilt.height + off))
+            replace(axis, pair_tilt=PairTilt(*axis.pair_tilt.radii).about(axis.pair_tilt.height + off))
             for axis in plant.axes
         )
         loop_experiment = prepare(loop_experiment.scenario, plant)

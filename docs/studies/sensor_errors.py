@@ -76,7 +76,7 @@ def skew_gain() -> tuple[float, float]:
         [s^2]; the gain of the loop that this closes: y1 -> u by K_e, u -> acceleration.
     """
     plant = load_plant()
-    tilt, reduced = plant.radial_tilt, plant.reduced
+    tilt, reduced = plant.pair_tilt, plant.reduced
     added = tilt.r_inner * tilt.r_outer / ((tilt.r_outer - tilt.r_inner) * plant.gravity)
     return added, TABLE_2_GAINS[0] * added * reduced.J_d * reduced.omega_d / reduced.J1
 

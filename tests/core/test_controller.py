@@ -13,7 +13,7 @@ from scipy.linalg import solve_continuous_are
 
 from cmg_mj.core.controller import Controller, KnownPlant
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.tilt import GimbalAngle, PairTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.observers import Estimate, Measurement, make_observer
@@ -179,7 +179,7 @@ def controller(observer: Any, law: StateFeedback | None = None, **options: Any) 
         observer,
         law or StateFeedback(DT),
         IDEAL_SENSORS,
-        KnownPlant(RadialTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
+        KnownPlant(PairTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
         **options,
     )
 

@@ -9,7 +9,7 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.planar_tilt import PlanarTilt
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 
 G = 9.81
 RNG = np.random.default_rng(4)
@@ -45,14 +45,14 @@ def test_the_motion_that_it_was(places: tuple[complex, ...], has_angle: bool, mo
 
 
 PAIRS = [
-    RadialTilt(0.067, 0.202),
-    RadialTilt(0.1656, 0.1607, across=(0.0265, -0.0133)),
-    RadialTilt(-0.05, 0.2, across=(0.0, 0.1), angles=(math.pi / 2.0, -2.0)),
+    PairTilt(0.067, 0.202),
+    PairTilt(0.1656, 0.1607, across=(0.0265, -0.0133)),
+    PairTilt(-0.05, 0.2, across=(0.0, 0.1), angles=(math.pi / 2.0, -2.0)),
 ]
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-def test_two_are_the_pair_of_the_rig(pair: RadialTilt) -> None:
+def test_two_are_the_pair_of_the_rig(pair: PairTilt) -> None:
     planar = PlanarTilt(tuple(c + 1j * r for r, c in pair.places), (0.4, 0.4), G)
     exact = [np.exp(-1j * angle) * f for f, angle in zip(forces(planar.places), pair.angles, strict=True)]
     across, up = -G * np.sin(Y), G * np.cos(Y)

@@ -64,7 +64,7 @@ def test_its_steady_state_is_that_of_the_riccati_equation() -> None:
 
 def test_it_expects_5_mg_between_the_accelerometers_of_the_bundled_rig() -> None:
     plant = cmg_mj.load_plant()
-    offset = plant.radial_tilt.acceleration(0.0, 0.0, 5e-3 * plant.gravity, 0.0)
+    offset = plant.pair_tilt.acceleration(0.0, 0.0, 5e-3 * plant.gravity, 0.0)
     assert gyro_free().bias_start == pytest.approx(offset, rel=0.1)
 
 

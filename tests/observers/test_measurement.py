@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cmg_mj
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.observers import Measurement
 
 G = 9.81
@@ -24,7 +24,7 @@ def test_two_angles_unpack_and_the_acceleration_is_beside_them() -> None:
 
 
 def test_noise_and_correlation_are_those_of_random_readings() -> None:
-    tilt_estimate, sigma = RadialTilt(0.067, 0.201), 0.0392
+    tilt_estimate, sigma = PairTilt(0.067, 0.201), 0.0392
     rng = np.random.default_rng(1)
     n = 200_000
     ix, iz, ox, oz = sigma * rng.standard_normal((4, n))

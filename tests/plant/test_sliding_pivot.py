@@ -60,7 +60,7 @@ def y1_of(plant: Plant, tilt: float, gimbal_rate: float) -> float:
     for module in plant.axis.modules:
         data.qvel[module.gimbal_dof] = module.direction * gimbal_rate
     mujoco.mj_forward(plant.model, data)
-    return plant.radial_tilt(*plant.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
+    return plant.pair_tilt(*plant.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
 
 
 def test_it_is_the_common_mass_centre_that_stays(plant: Plant) -> None:
@@ -113,7 +113,7 @@ def test_y1_of_a_frame_that_bends_on_a_cart_is_mujocos(
         data.qvel += state[model.nv : 2 * model.nv]
         data.act += state[2 * model.nv :]
         mujoco.mj_forward(model, data)
-        return bending.radial_tilt(*bending.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
+        return bending.pair_tilt(*bending.axis.ideal(data.sensordata.tolist(), data.qvel).accelerations)
 
     slopes = [(y1_at(SMALL * column) - y1_at(-SMALL * column)) / (2.0 * SMALL) for column in np.eye(len(y1))]
     np.testing.assert_allclose(slopes, y1, rtol=1e-5, atol=1e-4)
@@ -146,7 +146,7 @@ def test_accelerometers_show_what_the_reduced_model_says(plant: Plant, known: Pl
     for rig, shown in ((plant, (c1, d)), (known, (1.0, 0.0))):
         physics = ReducedPhysics(rig.parameters, 2, 0.005)
         physics.x[0], physics._u = np.array([SMALL, 0.0]), np.array([0.0, SMALL])
-        searched = rig.radial_tilt(*physics.reading(physics.x).accelerations)
+        searched = rig.pair_tilt(*physics.reading(physics.x).accelerations)
         tried = y1_of(rig, SMALL, 0.0), y1_of(rig, 0.0, SMALL)
         assert np.asarray(tried) / SMALL == pytest.approx(shown, rel=1e-4, abs=1e-4)
         assert searched / SMALL == pytest.approx(shown, rel=1e-4, abs=1e-4)
@@ -167,7 +167,7 @@ def test_far_from_upright_the_pivot_accelerates_as_the_model_says(plant: Plant) 
 def test_the_tilt_is_taken_about_the_mass_centre(plant: Plant, known: Plant) -> None:
     """The radii count from there, negative below it; from the pivot they are what they were, and so is alpha."""
     arm = plant.reduced.pivot_arm
-    tilt, about = plant.radial_tilt, known.radial_tilt
+    tilt, about = plant.pair_tilt, known.pair_tilt
     assert (tilt.height, about.height) == (0.0, arm)
     assert (about.r_inner, about.r_outer) == (tilt.r_inner - arm, tilt.r_outer - arm)
     assert about.r_inner < 0.0 < about.r_outer
@@ -182,7 +182,7 @@ def test_a_pivot_at_rest_is_what_it_was(model: str) -> None:
     plant = load_plant(model=model)
     for axis, filed in zip(plant.axes, plant.filed.axes, strict=True):
         assert axis.reduced.pivot_arm == 0.0
-        assert axis.radial_tilt == filed.radial_tilt
+        assert axis.pair_tilt == filed.pair_tilt
         assert axis.reduced.measured_tilt(0.0, plant.gravity) == (1.0, 0.0)
     assert not plant.reduced.pivot_arm
     with pytest.raises(InputError, match=r"plant.pivot_slides = true: .*the pivot.* does not slide freely; leave it"):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.inputs.files import folder
 from cmg_mj.plant.plant import Plant, load_plant
 from cmg_mj.results.trajectory import Trajectory
@@ -166,7 +166,7 @@ def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
     path = move_sites(tmp_path)
     plant = load_plant(accelerometer_inner_m=INNER, accelerometer_outer_m=OUTER)
     file_plant = load_plant(model=str(path))
-    assert plant.radial_tilt == RadialTilt(INNER, OUTER)
+    assert plant.pair_tilt == PairTilt(INNER, OUTER)
     for model, other in ((plant.model, file_plant.model), (plant.drawn_model, file_plant.drawn_model)):
         np.testing.assert_allclose(model.site_pos, other.site_pos, rtol=0.0, atol=1e-15)
     by_setting = run(f"plant.accelerometer_inner_m={INNER}", f"plant.accelerometer_outer_m={OUTER}")
@@ -198,7 +198,7 @@ def aside_in_a_file(target: Path) -> Path:
 def test_accelerometers_anywhere_in_the_tilting_plane_show_the_motion(by_file: bool, tmp_path: Path) -> None:
     where: dict[str, Any] = {"model": str(aside_in_a_file(tmp_path))} if by_file else BY_SETTINGS
     plant = load_plant(lock_thrust_bearing=True, **where)
-    tilt = plant.radial_tilt
+    tilt = plant.pair_tilt
     found = [(*place, math.degrees(angle)) for place, angle in zip(tilt.places, tilt.angles, strict=True)]
     np.testing.assert_allclose(found, list(ASIDE.values()), atol=1e-12)
     data = plant.new_data()
@@ -214,10 +214,10 @@ def test_accelerometers_anywhere_in_the_tilting_plane_show_the_motion(by_file: b
 def test_misplaced_they_feel_what_is_there_and_the_estimate_knows_the_old_places() -> None:
     """At rest nothing shows; a turn shows in y1, and its acceleration by the wrong distance."""
     off = PlantSettings(accelerometer_inner_misplaced_mm=3.0, accelerometer_outer_misplaced_mm=-5.0)
-    assert load_plant(off).radial_tilt == load_plant().radial_tilt
+    assert load_plant(off).pair_tilt == load_plant().pair_tilt
     places = {"accelerometer_inner_m": INNER, "accelerometer_outer_m": OUTER}
     plant = load_plant(replace(off, **places, lock_thrust_bearing=True))
-    assert plant.radial_tilt == RadialTilt(INNER, OUTER)
+    assert plant.pair_tilt == PairTilt(INNER, OUTER)
     data = plant.new_data()
     span, rate = OUTER - INNER - 0.008, 3.0
     data.qpos[plant.tilt], data.qvel[plant.tilt] = plant.tilt_zero + 0.2, rate
@@ -227,8 +227,8 @@ def test_misplaced_they_feel_what_is_there_and_the_estimate_knows_the_old_places
     assert ox - ix == pytest.approx(span * alpha, rel=1e-12)
     assert oz - iz == pytest.approx(-span * rate**2, rel=1e-12)
     assert ix == pytest.approx((INNER + 0.003) * alpha - 9.81 * math.sin(0.2), rel=1e-12)
-    assert plant.radial_tilt.acceleration(ix, iz, ox, oz) == pytest.approx(alpha * span / (OUTER - INNER), rel=1e-12)
-    assert abs(plant.radial_tilt(ix, iz, ox, oz) - 0.2) > 1e-3
+    assert plant.pair_tilt.acceleration(ix, iz, ox, oz) == pytest.approx(alpha * span / (OUTER - INNER), rel=1e-12)
+    assert abs(plant.pair_tilt(ix, iz, ox, oz) - 0.2) > 1e-3
     drawn = {name: plant.drawn_model.site(name).pos for name in ("accelerometer_inner", "accelerometer_outer")}
     assert math.dist(*drawn.values()) == pytest.approx(span, rel=1e-12)
 

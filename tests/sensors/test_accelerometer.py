@@ -18,7 +18,7 @@ import cmg_mj
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.sensors import Sensors
@@ -28,7 +28,7 @@ from tests.recorded import assert_same_bits, push_recovery, recorded
 from tests.sensors.test_sampled import G, assert_sigma, measuring
 
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
-TILT = RadialTilt(0.06717514421272202, 0.20152543263816603)
+TILT = PairTilt(0.06717514421272202, 0.20152543263816603)
 FORCES_AT_REST = (0.0, G, 0.0, G)
 MS = 0.001
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.sensors.accelerometer import Accelerometer
 from tests.plant.full_model import states
@@ -42,7 +42,7 @@ def test_two_accelerometers_show_the_tilt_in_any_motion(model: str, bias_deg: fl
 
     inner_x, inner_z, outer_x, outer_z = np.array(forces).T
     alone = [np.arctan2(-inner_x, inner_z), np.arctan2(-outer_x, outer_z)]
-    estimates = np.array([plant.radial_tilt(inner_x, inner_z, outer_x, outer_z), *alone])
+    estimates = np.array([plant.pair_tilt(inner_x, inner_z, outer_x, outer_z), *alone])
     errors = np.abs(np.angle(np.exp(1j * (estimates - qpos[:, plant.tilt] + plant.tilt_zero))))
     assert errors[0].max() < 1e-9
     assert np.all(np.degrees(np.median(errors[1:], axis=1)) > 5.0)
@@ -52,7 +52,7 @@ def test_two_accelerometers_show_the_tilt_in_any_motion(model: str, bias_deg: fl
 
 def test_offset_of_biased_accelerometers() -> None:
     """At rest and upright: an outward bias b of either shifts the horizontal part of gravity by its weight times b."""
-    tilt, g = RadialTilt(0.06, 0.18), 9.81
+    tilt, g = PairTilt(0.06, 0.18), 9.81
     weights = (1.5, -0.5)  # r_outer/(r_outer - r_inner), -r_inner/(...)
 
     def offset(angle: float, inner: float, outer: float) -> float:
@@ -84,6 +84,6 @@ def test_apparent_bias_is_what_the_tilt_at_rest_lacks(errors: dict[str, Any]) ->
     accelerometer = Accelerometer(noise_density_ug_rthz=0.0, counts_per_g=0.0, **errors)
     data = plant.new_data()
     ideal = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist())
-    reading = plant.radial_tilt(*measuring(accelerometer)(ideal))
+    reading = plant.pair_tilt(*measuring(accelerometer)(ideal))
 
     assert plant.apparent_bias(accelerometer) == pytest.approx(-reading, abs=1e-9)

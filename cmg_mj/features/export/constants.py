@@ -10,7 +10,7 @@ from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import Observer
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.laws import Law, StateFeedback
@@ -66,7 +66,7 @@ def constants_of(controller: Controller) -> Constants:
     )
 
 
-def _beside(tilt: RadialTilt) -> Iterator[Constant]:
+def _beside(tilt: PairTilt) -> Iterator[Constant]:
     """Yield where accelerometers that are not on the ray lie beside it, and by how much they are turned."""
     if not tilt.is_radial:
         for which, across in zip(("inner", "outer"), tilt.across, strict=True):

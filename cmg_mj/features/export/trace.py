@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import casadi
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.tilt import GimbalAngle, RadialTilt
+from cmg_mj.core.tilt import GimbalAngle, PairTilt
 from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state, reads_gyro
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
@@ -123,7 +123,7 @@ def _measure(constants: Constants) -> casadi.Function:
     )
     beside = tuple(parameters[2 + 2 * n :])  # across and angles, if there are any
     lies = {"across": beside[:2], "angles": beside[2:]} if beside else {}
-    tilt, gimbal_angle = RadialTilt(inner, outer, **lies), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
+    tilt, gimbal_angle = PairTilt(inner, outer, **lies), GimbalAngle(directions, zeros)  # type: ignore[arg-type]
     y = (tilt(*forces), gimbal_angle(encoders), tilt.acceleration(*forces))
     return function_of("measure", [*forces, *encoders, *parameters], [expression(part) for part in y])
 

@@ -272,7 +272,7 @@ ROLES: dict[str, Quantity] = {
 }
 """Role -> quantity of its column.
 
-`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `RadialTilt` takes them, `ax` and
+`tilt` is the angle from the vertical, `inner_x` to `outer_z` two accelerometers as `PairTilt` takes them, `ax` and
 `az` one accelerometer: along the motion of a growing tilt, and outward (upward while upright), `acceleration` the
 angular acceleration of the tilt, `gimbal` the gimbals' common angle from the spin axis' upright place (or `gimbal1` and
 `gimbal2`, whose half difference it is), `command` their rate, `gyro` a gyro that observers take, `rate` the

@@ -99,7 +99,7 @@ def test_an_acceleration_across_tilts_what_accelerometers_see() -> None:
     physics.accelerate([0.5 * part for part in across])
     reading = physics.reading([0.0] * 6)
     assert isinstance(reading, IdealReading)
-    assert rig.plant.radial_tilt(*reading.accelerations) == pytest.approx(-math.atan2(0.5, 9.81), abs=1e-9)
+    assert rig.plant.pair_tilt(*reading.accelerations) == pytest.approx(-math.atan2(0.5, 9.81), abs=1e-9)
 
 
 def test_directions_of_several_axes_are_those_of_their_lines() -> None:

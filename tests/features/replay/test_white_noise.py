@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from cmg_mj.core.tilt import RadialTilt
+from cmg_mj.core.tilt import PairTilt
 from cmg_mj.features.replay.log import LogNoise, Segment, WhiteNoise
 from cmg_mj.features.replay.noise import _agreeing, white_noise_of
 
@@ -140,7 +140,7 @@ def test_short_parts_tell_nothing_and_gaps_nothing_wrong() -> None:
 
 
 def test_tilt_and_acceleration_of_the_same_sensors_are_correlated() -> None:
-    geometry, random = RadialTilt(0.1, 0.3), np.random.default_rng(0)
+    geometry, random = PairTilt(0.1, 0.3), np.random.default_rng(0)
     inner, outer = 0.05 * random.standard_normal((2, N))
     y = motion(CLOCK) - (1.5 * inner - 0.5 * outer) / 9.81
     noise = noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=(outer - inner) / 0.2)

@@ -26,7 +26,7 @@ def test_the_other_axis_is_what_it_was(model: str, locked: str, left: str, axis_
     assert plant.axis_names == [left]
     assert plant.joint_names == [name for name in whole.joint_names if name != locked]
     np.testing.assert_allclose(astuple(plant.reduced), astuple(whole.axes[axis_index].reduced), rtol=1e-9)
-    np.testing.assert_allclose(plant.radial_tilt.places, whole.axes[axis_index].radial_tilt.places)
+    np.testing.assert_allclose(plant.pair_tilt.places, whole.axes[axis_index].pair_tilt.places)
     assert plant.drawn_model.nv == plant.model.nv
 
 

@@ -209,7 +209,7 @@ def test_what_accelerometers_show_of_a_tilt_that_is_swept_round(plant: Plant) ->
         mujoco.mj_forward(plant.model, data)
         axis = plant.axes[i]
         forces = axis.ideal(data.sensordata, data.qvel).accelerations
-        reading = axis.radial_tilt.acceleration(*forces)
+        reading = axis.pair_tilt.acceleration(*forces)
         true = axis.line.rate(data.qacc)
         assert reading - true == pytest.approx(
             w * plant.turning.coriolis[i, j] * rate, rel=1e-2
