@@ -1,7 +1,8 @@
 """Observers on measured logs of a balancer with two accelerometers, two gyros and an angle sensor on one rigid frame.
 
     git clone https://github.com/AodhAnd/p6-cubli-report
-    python docs/studies/measured.py p6-cubli-report
+    git clone https://github.com/agnieszkaszczesna/RepoIMU
+    python docs/studies/measured.py p6-cubli-report --pendulum RepoIMU
 
 Half a minute. The rig is identified on the log sensorstestwSimon3 alone. Judged are sensorstestwSimon1, pushed by hand,
 and the second half of sisotool1, in closed loop; the pendulum of the observers with a model is that of its first half.
@@ -9,6 +10,9 @@ Errors are RMS against the mean of both gyros, less their offset [rad/s], from 1
 No parameter is tuned.
 
 The clone is of commit ebfeaa08 (Aalborg University, group 630, 2016). It has no licence, so the logs are not here.
+
+With `--pendulum`, beside: a pendulum that hangs, with one IMU and its angle by motion capture (commit 24145fc4, Silesian
+University of Technology, 2016, no licence). Identified on trial 02a, judged on 02b against the gyro, which is not used.
 """
 
 from __future__ import annotations
@@ -80,6 +84,40 @@ def rig_of(found: Identified, delays: bool = False) -> Rig:
     return Rig.model_validate({**fields, "log": {}, "delays_s": late})
 
 
+def pendulum(clone: Path, folder: Path) -> str:
+    """Judge observers on the top segment of a hanging pendulum.
+
+    The repository holds rows at 88 Hz, and repeats the accelerometer, at 26 Hz, in between; rows with a new force are
+    used. Its x points up at rest, so the tilt is near 0 and the sensor is below the pivot.
+    """
+    roles = {"time": "t_s", "tilt": "angle_rad", "rate": "gyro_rad_s"}
+    accelerometer = PlacedAccelerometer(columns=("across", "up"), place_m=(0.0, 0.0))
+    logs = {}
+    for trial in ("02a", "02b"):
+        rows = np.loadtxt(clone / f"Pendulum/Pendulum_Test{trial}_Trial1_Segment_1.csv", delimiter=";", skiprows=2)
+        rows = rows[[True, *np.diff(rows[:, 5:8], axis=0).any(axis=1)]]
+        angle = np.unwrap(2.0 * np.arctan2(rows[:, 4], rows[:, 1]))
+        logs[trial] = folder / f"{trial}.csv"
+        table = np.column_stack([rows[:, 0], angle, rows[:, [6, 5, 10]]])
+        np.savetxt(logs[trial], table, delimiter=",", header="t_s,angle_rad,across,up,gyro_rad_s", comments="")
+        apart = float(np.std(np.gradient(angle, rows[:, 0]) - rows[:, 10]))
+    found = identify_rig(read_channels(logs["02a"], ReadOptions(roles, rig=Rig(accelerometer=(accelerometer,)))))
+    rig = rig_of(found)
+    alone = {"time": "t_s", "ax": "across", "az": "up", "rate": "gyro_rad_s"}
+    forces = {"ax": "m_s2", "az": "m_s2"}
+    rows = []
+    for source, options, observers in (
+        ("nothing", ReadOptions(roles), ("zero",)),
+        ("accelerometer alone", ReadOptions(alone, forces), ("linear",)),
+        ("motion capture", ReadOptions(roles), (*TILT_ALONE, "finite_difference")),
+        ("motion capture, accelerometer, pivot at rest", ReadOptions(roles, rig=rig), ("gyro_free", "free_pivot")),
+    ):
+        row = errors(logs["02b"], options, tuple(o for o in observers if o in OBSERVERS) or ("linear",))
+        rows += [[source, f"`{o}`", row[o]] for o in observers]
+    rows.append(["motion capture, not causal", "central difference", f"{apart:.3f}"])
+    return f"{markdown_table(['from', 'observer', 'pendulum'], rows)}\n\nplace: {rig.accelerometer[0].place_m}"
+
+
 def errors(path: Path, options: ReadOptions, observers: tuple[str, ...]) -> dict[str, str]:
     """Replay observers on a log; the error of each [rad/s]."""
     log = read_log(path, options)
@@ -92,13 +130,17 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clone", type=Path)
-    clone = parser.parse_args().clone
+    parser.add_argument("--pendulum", type=Path)
+    arguments = parser.parse_args()
+    clone = arguments.clone
     files = {"identified": f"{BY_HAND}/sensorstestwSimon3.csv", "by hand": f"{BY_HAND}/sensorstestwSimon1.csv"}
     files["closed loop"] = f"{CLOSED_LOOP}/sisotool1.csv"
     for name in files.values():
         if not (clone / name).is_file():
             raise SystemExit(f"{clone / name}: no such file; clone https://github.com/AodhAnd/p6-cubli-report")
     with tempfile.TemporaryDirectory() as folder:
+        if arguments.pendulum:
+            print(pendulum(arguments.pendulum, Path(folder)))
         logs, second = {}, (HALF_S, 1e6)
         for name, file in files.items():
             logs[name] = Path(folder) / f"{name}.csv"

@@ -146,8 +146,9 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
             raise InputError(f"{path}: the reference has no number where the tilt has one")
         if np.ptp(known) == 0.0:
             raise InputError(f"{path}: the reference is {known[0]:g} rad/s in every row: leave it out")
-    notes += _gravity_remarks(signals, options.scale)
-    if "ax" in signals:
+    roles = {role: signals[role] for role in columns if role in options.columns and role != "time"}
+    notes += _gravity_remarks(roles, options.scale)
+    if "ax" in roles:
         notes.append("the tilt is atan2(-ax, az): an acceleration of the sensor by 0.1 g puts it off by 5.7 deg")
     needed = {"gimbals": {"y2_rad", HELD}, "acceleration": {"acceleration_rad_s2"}}
     needed |= {"gyro": {GYRO}, "reference": {"rate"}}
