@@ -11,8 +11,9 @@ No parameter is tuned.
 
 The clone is of commit ebfeaa08 (Aalborg University, group 630, 2016). It has no licence, so the logs are not here.
 
-With `--pendulum`, beside: a pendulum that hangs, with one IMU and its angle by motion capture (commit 24145fc4, Silesian
-University of Technology, 2016, no licence). Identified on trial 02a, judged on 02b against the gyro, which is not used.
+With `--pendulum`, beside: a pendulum that hangs, with one IMU and its angle by motion capture (commit 24145fc4,
+Silesian University of Technology, 2016, no licence). Identified on trial 02a, judged on 02b against the gyro, which no
+observer gets.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ def rig_of(found: Identified, delays: bool = False) -> Rig:
     return Rig.model_validate({**fields, "log": {}, "delays_s": late})
 
 
-def pendulum(clone: Path, folder: Path) -> str:
+def hanging(clone: Path, folder: Path) -> str:
     """Judge observers on the top segment of a hanging pendulum.
 
     The repository holds rows at 88 Hz, and repeats the accelerometer, at 26 Hz, in between; rows with a new force are
@@ -140,7 +141,7 @@ def main() -> None:
             raise SystemExit(f"{clone / name}: no such file; clone https://github.com/AodhAnd/p6-cubli-report")
     with tempfile.TemporaryDirectory() as folder:
         if arguments.pendulum:
-            print(pendulum(arguments.pendulum, Path(folder)))
+            print(hanging(arguments.pendulum, Path(folder)))
         logs, second = {}, (HALF_S, 1e6)
         for name, file in files.items():
             logs[name] = Path(folder) / f"{name}.csv"
