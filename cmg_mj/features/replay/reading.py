@@ -70,8 +70,6 @@ HELD = "u_rad_s"
 """The signal that holds until the next row."""
 UNWRAP_STEP = 1.5 * math.pi
 """A larger step of the tilt from one row to the next is a wrapped angle, not a motion [rad]."""
-NO_ANGLE = 2.5 * math.pi
-"""A larger step leads to a number that is no angle, or back [rad]."""
 MAX_DELAY_S = 1e6
 """Longest delay of a reference [s]."""
 MAX_RADIUS_M = 10.0
@@ -118,8 +116,8 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         raise InputError(f"--delay {options.delay_s:g}: must be from -{MAX_DELAY_S:g} to {MAX_DELAY_S:g} s")
     if "rate" not in columns and (options.delay_s or options.windows_s):
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
-    time, signals = _times(path, read_table(path, columns, options), options)
     notes: list[str] = []
+    time, signals = _times(path, read_table(path, columns, options), options, notes)
     slowest = MIN_RATE_HZ
     if "time" in columns and columns["time"].unit is None:
         notes.append(f"the time {columns['time'].name!r} is taken as seconds")
@@ -182,7 +180,10 @@ def read_channels(path: Path | str, options: ReadOptions) -> Channels:
     """
     path, notes = Path(path), list[str]()
     columns = columns_of(options)
-    time, signals = _times(path, read_table(path, columns, options), options)
+    time, signals = _times(path, read_table(path, columns, options), options, notes)
+    sensors = {role: values for role, values in signals.items() if role == "rate" or role not in options.columns}
+    if sensors and clipped_rows(sensors, columns, notes).any():
+        raise InputError(f"{path}: {notes[-1].partition(':')[0]}: clipped; leave that out, --time-range START:END")
     if "tilt" in signals:
         signals["tilt"] = _unwrapped(signals["tilt"], notes)
     paced = signals.get("tilt", next(values for values in signals.values()))
@@ -251,10 +252,12 @@ def _windows_inside(path: Path, windows: Sequence[Window], time: np.ndarray) -> 
 
 
 def _times(
-    path: Path, signals: dict[str, np.ndarray], options: ReadOptions
+    path: Path, signals: dict[str, np.ndarray], options: ReadOptions, notes: list[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return the rows' times, (n_rows,) [s], and their other signals, of the time range alone."""
     time = signals.pop("time", None)
+    for role in sorted(signals.keys() - {"command", "torque"}):  # which may be 0 but for one step
+        signals[role] = _known(role, signals[role], notes)
     if time is None and options.rate_hz is None:
         raise InputError(f"{path}: no time: name its column, --columns time=..., or give --rate HZ")
     counted = np.arange(len(next(iter(signals.values())))) / (options.rate_hz or 1.0)
@@ -311,19 +314,32 @@ def _measured(
     return measured
 
 
+def _known(name: str, values: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Return values with NaN for a few, such as -999, that are further from all others than those are apart."""
+    sizes = np.unique(values[np.isfinite(values)])
+    if len(sizes) > 2:
+        at = int(np.argmax(np.diff(sizes)))
+        low, high = sizes[at : at + 2]
+        is_high = np.mean(values > low) < FEW_REPEATED
+        rest = np.ptp(sizes[: at + 1] if is_high else sizes[at + 1 :])
+        away = values > low if is_high else values < high
+        if 0.0 < rest < high - low and 0.0 < away.mean() < FEW_REPEATED:
+            notes.append(
+                f"{counted(away.sum(), 'row')} of {name!r} beside all others, as {values[away][0]:g}: no number"
+            )
+            return _known(name, np.where(away, math.nan, values), notes)
+    return values
+
+
 def _unwrapped(angle: np.ndarray, notes: list[str]) -> np.ndarray:
-    """Unwrap an angle that starts again after a turn, and note it. A few numbers further away become NaN."""
+    """Unwrap an angle that starts again after a turn, and note it."""
     known, out = np.isfinite(angle), angle.copy()
-    steps = np.diff(angle[known])
-    level = np.cumsum([0.0, *np.sign(steps) * (np.abs(steps) > NO_ANGLE)])
-    away = level != int(np.median(level))
-    if away.mean() < FEW_REPEATED:
-        out[known] = np.where(away, math.nan, angle[known])
-    known = np.isfinite(out)
     jumps = int((np.abs(np.diff(out[known])) > UNWRAP_STEP).sum())
     if jumps:
         notes.append(f"the tilt jumps by a turn {counted(jumps, 'time')}: made to run on")
         out[known] = np.unwrap(out[known])
+    elif known.any() and np.ptp(out[known]) > 2.0 * math.pi:
+        notes.append(f"the tilt covers {np.ptp(out[known]):.3g} rad; if these are degrees, --units tilt=deg")
     return out
 
 
@@ -394,7 +410,8 @@ def _sample(
     shortest, longest = (1e3 * float(step) for step in (steps[~gaps].min(), max(between, steps[~gaps].max())))
     if resampled:
         rows = f"{1.0 / period:.6g} Hz" if even else f"uneven steps, {shortest:.4g} to {longest:.4g} ms, are"
-        own = f"; if they were measured evenly, {cure}" if between else ""
+        take_turns = between and np.diff(steps > gap).mean() > FEW_REPEATED
+        own = f"; if they were measured evenly, {cure}" if take_turns else ""
         lines = "straight lines" if steps.min() < TIGHT * gap else "cubic splines"
         notes.append(f"{rows} resampled to {1.0 / dt:.6g} Hz by {lines}{own}")
     elif np.ptp(steps[~gaps]) > EVEN * period:
@@ -608,13 +625,15 @@ def _gravity_remarks(signals: Values, scale: Mapping[str, float]) -> list[str]:
         if x not in signals:
             continue
         size = float(np.nanmedian(np.hypot(signals[x], signals[z]))) / STANDARD_GRAVITY
-        upward = float(np.nanmedian(signals[z])) / STANDARD_GRAVITY
+        across, upward = (float(np.nanmedian(signals[role])) / STANDARD_GRAVITY for role in (x, z))
         now = {role: scale.get(role, 1.0) for role in (x, z)}
         if size > 0.0 and not NEAR[0] <= size <= NEAR[1]:
             cure = ",".join(f"{role}={factor / size:.4g}" for role, factor in now.items())
             remarks.append(
                 f"the specific force of {x} and {z} is {size:.4g} times gravity's 9.81 m/s^2: --scale {cure}"
             )
+        elif abs(across) > NEAR[0] > abs(upward):
+            raise InputError(f"--columns {x}, {z}: gravity lies along {x}, {across:.2g} g in the median: swap the two")
         elif upward < 0.0:
             turned = ",".join(f"{role}={-factor:g}" for role, factor in now.items())
             remarks.append(
