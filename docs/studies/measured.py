@@ -96,7 +96,7 @@ def hanging(clone: Path, folder: Path) -> str:
     logs = {}
     for trial in ("02a", "02b"):
         rows = np.loadtxt(clone / f"Pendulum/Pendulum_Test{trial}_Trial1_Segment_1.csv", delimiter=";", skiprows=2)
-        rows = rows[[True, *np.diff(rows[:, 5:8], axis=0).any(axis=1)]]
+        rows = rows[np.append(True, np.any(np.diff(rows[:, 5:8], axis=0), axis=1))]
         angle = np.unwrap(2.0 * np.arctan2(rows[:, 4], rows[:, 1]))
         logs[trial] = folder / f"{trial}.csv"
         table = np.column_stack([rows[:, 0], angle, rows[:, [6, 5, 10]]])
