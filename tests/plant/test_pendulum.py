@@ -81,11 +81,11 @@ def test_the_equilibrium_bias_keeps_the_gravity_torque() -> None:
 
 def test_less_than_the_rest_of_the_plant_has_is_refused_with_the_least() -> None:
     with pytest.raises(InputError, match=r"plant\.tilt_inertia_kg_m2 = 0\.05: must be at") as refused:
-        load_plant(**SET | {"tilt_inertia_kg_m2": 0.05})
+        load_plant(tilt_inertia_kg_m2=0.05, tilt_gravity_n_m=TORQUE)
     least = float(re.findall(r"at least ([\d.]+),", str(refused.value))[0])
-    assert load_plant(**SET | {"tilt_inertia_kg_m2": least + 1e-4})
+    assert load_plant(tilt_inertia_kg_m2=least + 1e-4, tilt_gravity_n_m=TORQUE)
     with pytest.raises(InputError, match="must be at least"):
-        load_plant(**SET | {"tilt_inertia_kg_m2": least - 1e-4})
+        load_plant(tilt_inertia_kg_m2=least - 1e-4, tilt_gravity_n_m=TORQUE)
 
 
 def test_what_it_cannot_stand_for_is_refused() -> None:

@@ -425,11 +425,11 @@ def read_table(path: Path, columns: dict[str, Column], options: ReadOptions) -> 
         raise
     except (pa.ArrowException, OSError, ValueError, LookupError, OverflowError, TypeError) as error:
         said = re.sub("CSV parse error: Row #", "about line ", " ".join(str(error).split()))
-        text = shortened(
-            re.sub(r"In CSV column #(\d+): Row #(\d+)", lambda m: f"about line {m[2]}, column {int(m[1]) + 1}", said)
-        )
+        said = re.sub(r"In CSV column #(\d+): Row #(\d+)", lambda m: f"about line {m[2]}, column {int(m[1]) + 1}", said)
+        text = shortened(re.sub(r"CSV conversion error to double: invalid value ('.*)", r"\1 is no number", said))
         raise InputError(
-            f"{path}: cannot be read: {text}. A CSV is read with --delimiter, --encoding and --decimal"
+            f"{path}: cannot be read: {text}. Delete a line of units; a CSV is read with --delimiter, --encoding and "
+            "--decimal"
         ) from error
     if not table.num_rows:
         raise InputError(f"{path}: has no row")
@@ -498,6 +498,7 @@ def _read_csv(path: Path, file: BinaryIO, columns: Mapping[str, Column], options
     kinds = dict.fromkeys(names, pa.binary())
     kinds |= dict.fromkeys(wanted, pa.float64())
     convert = pacsv.ConvertOptions(decimal_point=options.decimal, column_types=kinds, strings_can_be_null=True)
+    convert.null_values = [*convert.null_values, "-", "--"]
     try:
         table = pacsv.read_csv(file, read, parse, convert)
     except pa.ArrowInvalid:

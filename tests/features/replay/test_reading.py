@@ -16,7 +16,7 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import STANDARD_GRAVITY
 from cmg_mj.features.replay.log import ACCELEROMETERS, Log, ReadOptions, assignments, unit_of_name
-from cmg_mj.features.replay.reading import read_log
+from cmg_mj.features.replay.reading import read_channels, read_log
 from tests.features.replay.motion import (
     AMPLITUDE,
     COLUMNS,
@@ -146,8 +146,43 @@ def test_a_number_that_stands_for_none_is_no_turn(rows: int | slice, tmp_path: P
     columns = sine()
     columns["tilt_rad"][rows] = 1e4
     log = read(tmp_path, columns)
-    assert "without a usable number discarded" in log.notes[0]
+    assert "of 'tilt' beside all others, as 10000: no number" in log.notes[0]
+    assert "without a usable number discarded" in log.notes[1]
     assert_sine(log, 3e-4)
+
+
+def test_a_number_that_stands_for_none_is_no_reference(tmp_path: Path) -> None:
+    columns = sine()
+    columns["gyro_rad_s"][::50] = -999.0
+    log = read(tmp_path, columns)
+    assert "80 rows of 'rate' beside all others" in log.notes[0]
+    assert_sine(log, 3e-4)
+
+
+def test_a_dash_is_no_number(tmp_path: Path) -> None:
+    columns = sine()
+    log = read(tmp_path, {**columns, "gyro_rad_s": [*columns["gyro_rad_s"][:9], "-", *columns["gyro_rad_s"][10:]]})
+    assert np.isnan(log["reference_rad_s"][9])
+    assert_sine(log, 3e-4)
+
+
+def test_degrees_taken_as_radians_are_named(tmp_path: Path) -> None:
+    log = read(tmp_path, {name: values * (1.0 if name == "t_s" else 57.3) for name, values in sine().items()})
+    assert "if these are degrees, --units tilt=deg" in log.notes[0]
+
+
+def test_swapped_axes_are_refused(tmp_path: Path) -> None:
+    columns = {"t_s": T, "x": -np.sin(tilt(T)), "z": np.cos(tilt(T))}
+    with pytest.raises(InputError, match=r"gravity lies along ax, 0.99 g in the median: swap"):
+        read(tmp_path, columns, {"time": "t_s", "ax": "z", "az": "x"}, units={"ax": "g", "az": "g"})
+
+
+def test_two_blocks_of_rows_take_no_turns(tmp_path: Path) -> None:
+    time = np.concatenate([0.007 * np.arange(1500), 10.5 + 0.037 * np.arange(500)])
+    columns = {"t_s": time, "tilt_rad": tilt(time), "gyro_rad_s": rate(time)}
+    log = read(tmp_path, columns)
+    assert "leave time out" not in " ".join(log.notes)
+    assert_sine(log, 5e-3)
 
 
 @pytest.mark.parametrize("rate_hz", [400.0, 800.0, 900.0, 980.0])
@@ -242,7 +277,10 @@ def test_gimbals_and_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (lambda c: {"tilt_rad": [0.1, "x", *[0.1] * (N - 2)]}, "about line 3, column 2: .*invalid value"),
+        (
+            lambda c: {"tilt_rad": [0.1, "x", *[0.1] * (N - 2)]},
+            "about line 3, column 2: .x. is no number.*line of units",
+        ),
         (lambda c: {"tilt_rad": ["1,2", *[0.1] * (N - 1)]}, "about line 2: Expected 3 columns, got 4"),
         (lambda c: {"note": c["t_s"], "note ": c["t_s"], "tilt_rad ": c["t_s"]}, "has 2 columns 'tilt_rad'"),
         (lambda c: {"tilt_rad": np.full(N, 0.3)}, "nothing moves"),
@@ -549,3 +587,10 @@ def test_a_number_beyond_all_sizes_is_none(place: str, size: float, tmp_path: Pa
     for sizes in (np.linspace(0.5, 1.0, N), np.linspace(-1e-250, 1.0, N), np.sin(60.0 * T)):
         with pytest.raises(InputError, match=f"column '{place}': .* numbers are beyond"):
             read(tmp_path, {**columns, place: size * sizes})
+
+
+def test_a_clipped_gyro_identifies_nothing(tmp_path: Path) -> None:
+    columns = sine()
+    columns["gyro_rad_s"] = np.clip(columns["gyro_rad_s"], -9.0, 1.0)
+    with pytest.raises(InputError, match=r"'gyro_rad_s' stands .*: clipped; leave that out, --time-range START:END"):
+        read_channels(write_csv(tmp_path / "log.csv", columns), ReadOptions(COLUMNS))

@@ -49,6 +49,14 @@ def test_they_show_tilt_and_angular_acceleration(n: int, columns: dict[str, str]
     np.testing.assert_allclose(log["acceleration_rad_s2"], ALPHA, atol=1e-7)
 
 
+def test_an_axis_may_be_named_as_a_role_is(tmp_path: Path) -> None:
+    shown = {**sine(T), "ay": 0.0 * T, "ax": 0.0 * T + STANDARD_GRAVITY}
+    rig = Rig.model_validate({"accelerometer": [{"columns": ("ay", "ax"), "place_m": (0.0, -0.15)}]})
+    columns = {"time": "t_s", "tilt": "tilt_rad", "rate": "gyro_rad_s"}
+    notes = read_log(write_csv(tmp_path / "log.csv", shown), ReadOptions(columns, rig=rig)).notes
+    assert not any("ax" in note for note in notes)
+
+
 @pytest.mark.parametrize("n_rows", [N, 800])
 def test_observers_assume_the_logs_noise_or_of_a_short_one_the_files(n_rows: int, tmp_path: Path) -> None:
     log = logged(tmp_path, 2, noise=NOISE)
