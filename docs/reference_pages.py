@@ -104,7 +104,7 @@ EXAMPLES = {
     "plant.accelerometer_inner_angle_deg": "90.0",
     "plant.accelerometer_outer_angle_deg": "180.0",
     "plant.tilt_inertia_kg_m2": "0.3",
-    "plant.tilt_gravity_n_m": "8.0",
+    "plant.tilt_gravity_n_m": "7.0",
     "plant.flywheel_momentum_n_m_s": "0.5",
     "plant.accelerometer_inner_misplaced_mm": "1.0",
     "plant.accelerometer_outer_misplaced_mm": "-1.0",

@@ -109,7 +109,6 @@ def _with_pendulum(rig: ResolvedModel, settings: PlantSettings) -> mujoco.MjMode
             "have where they are"
         )
     model.body_ipos[axis.frame] += shift * axis.up
-    model.body_sameframe[axis.frame] = 0  # should its mass centre have stood where its frame does
     model.body_inertia[axis.frame] += inertia - has
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
@@ -140,7 +139,6 @@ def _vary_masses_and_friction(
     shifts = [bias_shift(model, axis, path) for axis in biased]
     for axis, shift in zip(biased, shifts, strict=True):
         model.body_ipos[frame_bodies(model, axis)] += shift
-        model.body_sameframe[frame_bodies(model, axis)] = 0
     if settings.flywheel_imbalance_kg_m:
         for module in modules:
             body = model.dof_bodyid[module.flywheel_dof]

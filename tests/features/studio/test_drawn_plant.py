@@ -34,7 +34,7 @@ VARIATIONS = {
     "flywheel_speed_rad_s": 200.0,
     "flywheel_imbalance_kg_m": 1e-5,
     "tilt_inertia_kg_m2": 0.4,
-    "tilt_gravity_n_m": 9.0,
+    "tilt_gravity_n_m": 7.0,
     "flywheel_momentum_n_m_s": 0.5,
     "turn_rate_rad_s": 0.1,
 }
