@@ -115,6 +115,12 @@ def test_a_short_log_is_refused() -> None:
         identify_rig(simulated_log(*swaying(3.0), seed=1).channels, 8.0)
 
 
+def test_the_bundled_scenario_that_falls_is_too_short() -> None:
+    run = run_of(load_scenario("luenberger_fails"), 0)
+    with pytest.raises(InputError, match=r"lasts 2\.19 s; .* it takes 3\.\d* s: give a longer log"):
+        identify_rig(simulated_log(run["time_s"], run["x1_rad"], 0).channels)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "sensors"),

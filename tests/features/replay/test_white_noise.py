@@ -161,7 +161,22 @@ def test_what_follows_from_the_command_is_no_noise_of_the_acceleration() -> None
         u[k] = -0.8 * (true[k] + n[k])
     y = motion(CLOCK) + white(random)
     assert_size(noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n, u_rad_s=u).acceleration, 0.4)
-    assert_size(noise_of_rows(CLOCK, y1_rad=y, acceleration_rad_s2=true + n + 0.3 * np.sin(20.0 * CLOCK)).tilt, SIGMA)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_command_that_no_column_shows_does_is_motion_too(seed: int) -> None:
+    """The loop's acceleration has no white floor; the noise is that at which the tilt agrees with it."""
+    random = np.random.default_rng(seed)
+    n, y, true, rate, u = 0.4 * random.standard_normal(N), np.zeros(N), np.zeros(N), 0.0, 0.0
+    for k in range(1, N):
+        true[k] = 0.5 * true[k - 1] + u + np.sin(3.0 * CLOCK[k])
+        y[k] = y[k - 1] + DT * rate + DT * DT * (2.0 * true[k - 1] + true[k]) / 6.0
+        rate += 0.5 * DT * (true[k - 1] + true[k])
+        u = -0.8 * (true[k] + n[k]) - 40.0 * y[k] - 8.0 * rate
+    noise = noise_of_rows(CLOCK, y1_rad=y + white(random), acceleration_rad_s2=true + n)
+    assert isinstance(noise.acceleration, WhiteNoise)
+    assert noise.acceleration.low < 0.4 < noise.acceleration.high < 0.7
+    assert_size(noise.tilt, SIGMA)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
