@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cmg_mj.features.replay.log import Column, Values
-from cmg_mj.features.replay.noise import smallest_step
+from cmg_mj.features.replay.white_noise import smallest_step
 
 CLIPPED = 5
 """Fewest rows at an end of a signal's range for which its sensor counts as clipped."""

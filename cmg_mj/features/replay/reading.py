@@ -29,8 +29,8 @@ from cmg_mj.features.replay.log import (
     columns_of,
     read_table,
 )
-from cmg_mj.features.replay.noise import white_noise_of
 from cmg_mj.features.replay.sampling import FEW_REPEATED, HELD, MIN_RATE_HZ, reference_at, sample, select, unrounded
+from cmg_mj.features.replay.white_noise import white_noise_of
 from cmg_mj.results.trajectory import GYRO, Trajectory
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.scenario.rig_file import PlacedAccelerometer

@@ -10,7 +10,7 @@ from scipy.signal import butter, lfilter, sosfilt
 
 from cmg_mj.core.tilt import PairTilt
 from cmg_mj.features.replay.log import LogNoise, Segment, WhiteNoise
-from cmg_mj.features.replay.noise import _agreeing, white_noise_of
+from cmg_mj.features.replay.white_noise import _agreeing, white_noise_of
 
 DT, SIGMA, N = 0.005, 0.004, 4000
 CLOCK = DT * np.arange(N)
