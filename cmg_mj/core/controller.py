@@ -148,6 +148,8 @@ class Controller:
         """Rate of the frame along the tilt axis at the last update, as a perfect gyro on it shows [rad/s]."""
         self.coriolis: Scalar | None = None
         """Coriolis part of the measured angular acceleration, which the stage between axes sets [rad/s^2]."""
+        self.known_tilt: Scalar | None = None
+        """Tilt by which accelerometers err in a planned motion, which a stage between axes sets [rad]."""
         self.step: int | None = None
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
@@ -226,6 +228,8 @@ class Controller:
         """
         y1, y2 = self.tilt(*forces), self.gimbal_angle(encoders)
         acceleration = self.tilt.acceleration(*forces)
+        if self.known_tilt is not None:
+            y1 = y1 - self.known_tilt
         if self.coriolis is not None:
             acceleration = acceleration - self.coriolis
         y = _new(Measurement, (y1, y2))

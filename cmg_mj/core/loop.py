@@ -21,6 +21,8 @@ class Outside(NamedTuple):
     """About each axis, one for all worlds or (n_worlds,) [N m]."""
     acceleration: Sequence[Scalar] | None = None
     """The pivot's: x, y, z, likewise; None: it stays what it was, at first zero [m/s^2]."""
+    setpoints: tuple[Sequence[int], np.ndarray] | None = None
+    """Numbers of actuators that are no gimbal's and no flywheel's, and their controls; None: they stay."""
 
 
 class Disturbance(Protocol):
@@ -106,6 +108,10 @@ class Physics(Protocol):
 
     def accelerate(self, acceleration: Acceleration) -> None:
         """Set the pivot's acceleration [m/s^2]."""
+        ...
+
+    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+        """Set the controls of actuators that are no gimbal's and no flywheel's."""
         ...
 
     def command(self, u: Scalar, axis: int = 0) -> None:
@@ -210,6 +216,8 @@ class ControlLoop:
                 outside = disturb(step, steps, outside)
             if outside.acceleration is not None:
                 physics.accelerate(outside.acceleration)
+            if outside.setpoints is not None:
+                physics.control(*outside.setpoints)
             if outside.torques is not held:
                 held = outside.torques
                 torques = physics.push(held)

@@ -227,6 +227,8 @@ class IdealReading(NamedTuple):
     """The true tilt rate, q_b' [rad/s]: no sensor's, but what `feedback = "truth"` uses."""
     wheels: Sequence[Scalar] = ()
     """Rates of the flywheels, one a module [rad/s]: no sensor's, but what makes accelerometers vibrate."""
+    motion: Any = ()
+    """Of each accelerometer its velocity in the world, and its x and z axis there: 18 numbers, if the model shows it."""
 
 
 class MultiAxisReading(NamedTuple):
@@ -236,3 +238,5 @@ class MultiAxisReading(NamedTuple):
     """Readings of each axis."""
     turn_rate: Scalar
     """Upward rate of the frame, as a gyro on it measures [rad/s]."""
+    touch: Sequence[Scalar] = ()
+    """Forces on the touch sensors, in the order of the model [N]."""

@@ -41,6 +41,8 @@ class Feature(NamedTuple):
     """Finds the longest physics step: (section, plant settings, step, path) -> step [s]."""
     disturbance: str = ""
     """Makes what acts from outside: (sections, plants, seed, worlds) -> Disturbance."""
+    between: str = ""
+    """Makes the stage between the axes: (section, plant) -> (first controller) -> stage."""
     judge: str = ""
     """Says what `cmg-mj check` prints of it: (design, plant) -> Judgement."""
     commands: Mapping[str, Command] = {}
@@ -56,6 +58,11 @@ FEATURES = {
         edit="cmg_mj.features.bend.edit:bend_frame",
         limit_step="cmg_mj.features.bend.edit:limit_step",
         judge="cmg_mj.features.bend.verdict:describe_bend",
+    ),
+    "gait": Feature(
+        section="cmg_mj.features.gait:Gait",
+        disturbance="cmg_mj.features.gait.walk:leg_motion",
+        between="cmg_mj.features.gait.walk:support",
     ),
     "pivot": Feature(
         section="cmg_mj.features.pivot:Pivot",

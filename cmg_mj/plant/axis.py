@@ -68,6 +68,7 @@ class Axis:
     forces: list[int]
     encoders: list[int]
     gyro: int
+    motion: tuple[int, ...] = ()
     bias: float = 0.0
     initial_tilt: float = 0.0
     misplaced: bool = False
@@ -122,7 +123,8 @@ class Axis:
         else:  # of one world, at every tick
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         wheels = [qvel[dof] for dof in self._spins]
-        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels))
+        motion = [sensordata[address] for address in self.motion]
+        return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels, motion))
 
     def gimbal_angle(self, qpos: Joints) -> Scalar:
         """True x3: the gimbals' mean angle from upright, each in its own direction [rad]."""
@@ -212,7 +214,10 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
         [int(model.sensor_adr[element_id(model, "sensor", f"{module}/gimbal_encoder")]) for module in modules],
         int(model.sensor_adr[element_id(model, "sensor", f"{prefix}fog")]) + 1,  # its y axis
     )
-    return replace(axis, reduced=read_reduced(model, key, axis))
+    shown = [f"{prefix}{name}_{what}" for name in ACCELEROMETERS for what in ("velocity", "x", "z")]
+    numbers = [element_id(model, "sensor", name) for name in shown]
+    motion = [int(model.sensor_adr[i]) + j for i in numbers for j in range(3)] if min(numbers) >= 0 else []
+    return replace(axis, reduced=read_reduced(model, key, axis), motion=tuple(motion))
 
 
 def _find_module(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Module:

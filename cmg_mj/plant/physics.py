@@ -52,6 +52,10 @@ class OneWorld:
         for servo, direction in self._servos[axis]:
             ctrl[servo] = direction * u
 
+    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+        """Set the controls of other actuators."""
+        self._ctrl[actuators] = setpoints
+
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes [N m]."""
         apply_torques(self._applied, self._lines, torques)
@@ -123,6 +127,10 @@ class ManyWorlds:
     def command(self, u: Scalar, axis: int = 0) -> None:
         """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
         self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
+
+    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+        """Set the controls of other actuators, alike in all worlds."""
+        self._ctrl[:, actuators] = setpoints
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes, one for all or (n_worlds,) each; return arrays (n_worlds,) [N m]."""

@@ -222,8 +222,13 @@ class Plant:
         return self.axis.ideal if len(self.axes) == 1 else self._readings_of_axes
 
     def _readings_of_axes(self, sensordata: Joints, qvel: Joints) -> MultiAxisReading:
-        upward = sensordata[self.axis.gyro + 1]
-        return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward)
+        upward, touch = sensordata[self.axis.gyro + 1], [sensordata[address] for address in self._touch]
+        return MultiAxisReading([axis.ideal(sensordata, qvel) for axis in self.axes], upward, touch)
+
+    @cached_property
+    def _touch(self) -> list[int]:
+        """Addresses in sensordata of the touch sensors."""
+        return self.model.sensor_adr[self.model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH].tolist()
 
     def apparent_bias(self, accelerometer: Accelerometer) -> float:
         """Return the bias an observer should find: e less the tilt made by the accelerometers' constant errors.

@@ -19,7 +19,8 @@ TORQUES = {"push": Pushes, "swing": Swings}
 
 def outsides(scenario: Scenario) -> Outsides:
     """Take what acts from outside from a scenario."""
-    return {name: tuple(scenario.section(name)) for name in (*TORQUES, *entries("disturbance"))}
+    torques = {name: tuple(scenario.section(name)) for name in TORQUES}
+    return torques | {name: tuple(scenario.feature_sections[name]) for name in entries("disturbance")}
 
 
 def disturbances(
@@ -38,6 +39,6 @@ def disturbances(
         kind(settings[name], first.timestep, first.axis_names) for name, kind in TORQUES.items() if settings.get(name)
     ]
     for name, make in entries("disturbance").items():
-        if settings.get(name):
-            made.append(make(settings[name], plants, seed, world_ids))
+        if settings.get(name) and (one := make(settings[name], plants, seed, world_ids)):
+            made.append(one)
     return made

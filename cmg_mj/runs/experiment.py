@@ -132,6 +132,8 @@ class Experiment:
 
         compensates = self.scenario.controller.compensate_turning
         between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
+        for name, make in entries("between").items():
+            between = make(self.scenario.section(name), self.plant) or between
         return MultiAxisController(controllers, between)
 
     def run(self, driver: str = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:

@@ -14,7 +14,7 @@ from cmg_mj.inputs.types import STRICT, Latency, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
 from cmg_mj.stages.low_pass import LowPass, LowPassSettings
 from cmg_mj.stages.mounting_errors import PERFECT, MountingErrorsSettings, mounting_errors
-from cmg_mj.stages.pair import PairSettings, white
+from cmg_mj.stages.pair import Averaged, PairSettings, white
 from cmg_mj.stages.skew import Skew, SkewSettings
 from cmg_mj.stages.vibration import VibrationSettings, vibration
 
@@ -54,6 +54,7 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
     def at_work(self, site: Site) -> SampledSensor:
         """Start the accelerometers."""
         effects = (
+            (self.averaged, Averaged),
             (self.skew_s, Skew),
             (self.vibrates, vibration),
             (self.mounting_weights() != PERFECT, mounting_errors),
@@ -63,7 +64,7 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
         )
         digital = shown(self.range_g * STANDARD_GRAVITY, self.resolution)
         stages = [*(make(self, site) for is_on, make in effects if is_on), digital]
-        return SampledSensor(self.rate_hz, self.latency_s, site, "accelerations", stages)
+        return SampledSensor(self.rate_hz, self.latency_s, site, "motion" if self.averaged else "accelerations", stages)
 
 
 @dataclass(frozen=True, config=STRICT)

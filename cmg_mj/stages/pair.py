@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
+from cmg_mj.core.arrays import dot
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.sensor import SensorStage, Site
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
@@ -25,6 +26,7 @@ class PairSettings:
         range_g: Largest acceleration that a reading shows [g].
         counts_per_g: Resolution; 0 for readings that are not rounded.
         latency_s: Delay from the sampling of a reading to its use by the controller [s].
+        averaged: Whether a sample is the mean since the one before, as behind a low-pass, and no instant's.
     """
 
     rate_hz: Rate = 200.0
@@ -33,6 +35,7 @@ class PairSettings:
     range_g: Positive = 2.0
     counts_per_g: NonNegative = 16384.0
     latency_s: Latency = 0.0
+    averaged: bool = False
 
     inside_hz = 0.0
     """Samples a second that the part takes; 0: as many as it delivers."""
@@ -70,6 +73,31 @@ class PairSettings:
         """Offsets of the tangential axes of the inner and the outer accelerometer [m/s^2]."""
         inner, outer = (bias * 1e-3 * STANDARD_GRAVITY for bias in self.bias_mg)
         return inner, outer
+
+
+class Averaged:
+    """The mean specific force since the last sample: by the difference of the velocity, in the axes of the last instant.
+
+    A pass of the physics shows the acceleration of an instant, in which stiff servos and contacts answer to a setpoint
+    or a command that has just changed.
+    """
+
+    def __init__(self, part: PairSettings, site: Site) -> None:
+        self._period, self._last = 1.0 / part.raw_rate_hz, None
+
+    def __call__(self, motion: Any, ideal: IdealReading) -> Forces:
+        """Return the forces by the motion of both."""
+        last, self._last = self._last or motion, motion
+        forces = []
+        for first in (0, 9):
+            v, x, z = (motion[first + i : first + i + 3] for i in (0, 3, 6))
+            a = [(now - before) / self._period for now, before in zip(v, last[first : first + 3], strict=True)]
+            a[2] = a[2] + GRAVITY
+            forces += [dot(x, a), dot(z, a)]
+        return np.array(forces) if isinstance(forces[0], np.ndarray) else forces
+
+
+GRAVITY = 9.81
 
 
 def white(part: PairSettings, site: Site) -> SensorStage:

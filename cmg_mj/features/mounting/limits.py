@@ -151,6 +151,10 @@ class ReducedPhysics:
         """Refuse: the pivot of the reduced model is not driven."""
         raise NotImplementedError
 
+    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+        """Refuse: the reduced model has no other actuators."""
+        raise NotImplementedError
+
     def command(self, u: Scalar, axis: int = 0) -> None:
         """Set the gimbal rate, (n_worlds,) [rad/s]."""
         self._u = np.asarray(u)
