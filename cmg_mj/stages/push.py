@@ -78,10 +78,9 @@ class Pushes(Disturbance):
             self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
         elif outside is self._before:
             return self._sum
-        others, acceleration = outside
         held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
         self._before = outside
-        self._sum = Outside([a + b for a, b in zip(others, held, strict=True)], acceleration)
+        self._sum = outside._replace(torques=[a + b for a, b in zip(outside.torques, held, strict=True)])
         return self._sum
 
 

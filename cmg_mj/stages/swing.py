@@ -62,10 +62,9 @@ class Swings(Disturbance):
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Add the torques: see `Disturbance`."""
-        torques, acceleration = outside
         time = (step + 0.5 * steps) * self._timestep
         added = [
             sum(swing.torque(time) for swing in self._swings if (swing.axis or self._axes[0]) == axis)
             for axis in self._axes
         ]
-        return Outside([torque + more for torque, more in zip(torques, added, strict=True)], acceleration)
+        return outside._replace(torques=[a + b for a, b in zip(outside.torques, added, strict=True)])

@@ -29,3 +29,8 @@ class Gait(Section):
     double_s: Annotated[float, Field(ge=0.05, le=10.0)] = 0.5
     lift_m: Annotated[float, Field(gt=0.0, le=0.5)] = 0.02
     stand_s: Annotated[float, Field(ge=0.5, le=60.0)] = 1.25
+
+    @property
+    def unmodelled(self) -> str:
+        """See `Section`."""
+        return "the walk" if self.steps else ""

@@ -167,4 +167,4 @@ class PivotSignals:
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """Set the acceleration: see `Disturbance`."""
-        return Outside(outside.torques, self.mean(step * self._timestep, (step + steps) * self._timestep))
+        return outside._replace(acceleration=self.mean(step * self._timestep, (step + steps) * self._timestep))
