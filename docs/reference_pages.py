@@ -24,6 +24,7 @@ from pydantic_core import PydanticUndefined
 from cmg_mj.cli import HELP, Commands, cli
 from cmg_mj.features.bend import Bend
 from cmg_mj.features.export.constants import attribute_descriptions
+from cmg_mj.features.gait import Gait
 from cmg_mj.features.pivot import FIELDS_OF, Pivot
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.inputs.messages import fields_of
@@ -113,6 +114,12 @@ EXAMPLES = {
     "plant.tilt_damping_n_m_s": "0.02",
     "plant.flywheel_speed_rad_s": "300.0",
     "plant.flywheel_imbalance_kg_m": "1e-6",
+    "gait.steps": "22",
+    "gait.step_length_m": "0.15",
+    "gait.single_s": "0.4",
+    "gait.double_s": "0.3",
+    "gait.lift_m": "0.03",
+    "gait.stand_s": "2.0",
     "bend.frequency_hz": "25.0",
     "bend.damping_ratio": "0.02",
     "bend.share": "0.3",
@@ -330,6 +337,7 @@ skew_s = 0.0025
 OWN_TABLES = (
     "plant",
     "bend",
+    "gait",
     "controller",
     "observer",
     "sensors",
@@ -398,6 +406,7 @@ def scenario_sections() -> dict[str, type]:
         "": Scenario,
         "plant": PlantSettings,
         "bend": Bend,
+        "gait": Gait,
         "controller": ControllerSettings,
         "controller.lqr": LqrSettings,
         "observer": type(Scenario().observer),

@@ -228,7 +228,7 @@ class IdealReading(NamedTuple):
     wheels: Sequence[Scalar] = ()
     """Rates of the flywheels, one a module [rad/s]: no sensor's, but what makes accelerometers vibrate."""
     motion: Any = ()
-    """Of each accelerometer its velocity in the world, and its x and z axis there: 18 numbers, if the model shows it."""
+    """Of both accelerometers velocity, x and z axis in the world, 18 numbers, then g; if the model shows them."""
 
 
 class MultiAxisReading(NamedTuple):

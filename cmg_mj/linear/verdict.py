@@ -335,6 +335,7 @@ def omissions(scenario: Scenario) -> dict[str, str]:
     inner, outer = plant.accelerometer_inner_misplaced_mm, plant.accelerometer_outer_misplaced_mm
     clauses = [(name, part.unmodelled) for name, parts in scenario.feature_sections.items() for part in parts]
     clauses += [
+        ("sensors.accelerometer.averaged", accelerometer.averaged and "the accelerometers' means"),
         ("sensors.accelerometer.vibration_mg", accelerometer.vibration_mg and "the accelerometers' vibration"),
         (
             "sensors.accelerometer.wheel_harmonics_mg",

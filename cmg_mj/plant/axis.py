@@ -51,6 +51,8 @@ class Axis:
         forces: Addresses in sensordata of inner x, inner z, outer x, outer z.
         encoders: Addresses in sensordata of the gimbals' encoders.
         gyro: Address in sensordata of the gyro along the line.
+        motion: Addresses in sensordata of velocity, x and z axis of both accelerometers, if the model shows them.
+        gravity: [m/s^2].
         bias: Equilibrium bias e [rad].
         initial_tilt: Tilt from the equilibrium at the start [rad].
         misplaced: Whether an accelerometer sits elsewhere than the tilt estimate knows.
@@ -69,6 +71,7 @@ class Axis:
     encoders: list[int]
     gyro: int
     motion: tuple[int, ...] = ()
+    gravity: float = 0.0
     bias: float = 0.0
     initial_tilt: float = 0.0
     misplaced: bool = False
@@ -123,7 +126,7 @@ class Axis:
         else:  # of one world, at every tick
             forces, encoders = self._forces_of(sensordata), self._encoders_of(sensordata)
         wheels = [qvel[dof] for dof in self._spins]
-        motion = [sensordata[address] for address in self.motion]
+        motion = [*(sensordata[address] for address in self.motion), self.gravity] if self.motion else ()
         return _new(IdealReading, (forces, encoders, sensordata[self.gyro], self.line.rate(qvel), wheels, motion))
 
     def gimbal_angle(self, qpos: Joints) -> Scalar:
@@ -217,7 +220,8 @@ def find_axis(model: mujoco.MjModel, key: int, name: str, modules: Sequence[str]
     shown = [f"{prefix}{name}_{what}" for name in ACCELEROMETERS for what in ("velocity", "x", "z")]
     numbers = [element_id(model, "sensor", name) for name in shown]
     motion = [int(model.sensor_adr[i]) + j for i in numbers for j in range(3)] if min(numbers) >= 0 else []
-    return replace(axis, reduced=read_reduced(model, key, axis), motion=tuple(motion))
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    return replace(axis, reduced=read_reduced(model, key, axis), motion=tuple(motion), gravity=gravity)
 
 
 def _find_module(model: mujoco.MjModel, key: int, line: Line | None, name: str) -> Module:

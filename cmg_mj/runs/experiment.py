@@ -484,6 +484,11 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
     axes = []
     for part, rig in parts:
         with part.named_in_errors():
+            if part.sensors.accelerometer.averaged and not rig.axis.motion:
+                raise InputError(
+                    f"sensors.accelerometer.averaged = true: {rig.path} has no sensors accelerometer_inner_velocity, "
+                    "accelerometer_inner_x and so on, which show means; leave it out"
+                )
             axes.append(Experiment(part, rig, design(part, rig.parameters)))
     first = axes[0]
     return first if first.scenario is scenario else Experiment(scenario, plant, first.design, tuple(axes))

@@ -26,7 +26,8 @@ class PairSettings:
         range_g: Largest acceleration that a reading shows [g].
         counts_per_g: Resolution; 0 for readings that are not rounded.
         latency_s: Delay from the sampling of a reading to its use by the controller [s].
-        averaged: Whether a sample is the mean since the one before, as behind a low-pass, and no instant's.
+        averaged: Whether a sample is the mean since the one before, as behind a low-pass, and no instant's. The model
+            then has sensors framelinvel, framexaxis and framezaxis of both sites, which end in _velocity, _x and _z.
     """
 
     rate_hz: Rate = 200.0
@@ -76,7 +77,7 @@ class PairSettings:
 
 
 class Averaged:
-    """The mean specific force since the last sample: by the difference of the velocity, in the axes of the last instant.
+    """The mean specific force since the last sample, by the velocity's difference, in the axes of the last instant.
 
     A pass of the physics shows the acceleration of an instant, in which stiff servos and contacts answer to a setpoint
     or a command that has just changed.
@@ -92,12 +93,9 @@ class Averaged:
         for first in (0, 9):
             v, x, z = (motion[first + i : first + i + 3] for i in (0, 3, 6))
             a = [(now - before) / self._period for now, before in zip(v, last[first : first + 3], strict=True)]
-            a[2] = a[2] + GRAVITY
+            a[2] = a[2] + motion[-1]
             forces += [dot(x, a), dot(z, a)]
         return np.array(forces) if isinstance(forces[0], np.ndarray) else forces
-
-
-GRAVITY = 9.81
 
 
 def white(part: PairSettings, site: Site) -> SensorStage:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 
@@ -77,8 +78,8 @@ class _Legs:
         root = int(model.body_rootid[model.site_bodyid[feet[0]]]) if min(feet) >= 0 else -1
         if min(*joints, *servos, root) < 0 or model.jnt_type[model.body_jntadr[root]] != mujoco.mjtJoint.mjJNT_FREE:
             raise InputError(
-                f"gait.steps: takes a free robot with sites LEG/foot, and joints and actuators LEG/{', LEG/'.join(JOINTS)} "
-                f"of the LEGs {' and '.join(SIDES)}"
+                f"gait.steps: takes a free robot with sites LEG/foot, and joints and actuators "
+                f"LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
             )
         self.model, self.key, self.feet, self.servos = model, key, feet, np.array(servos)
         self.root = int(model.jnt_qposadr[model.body_jntadr[root]]), int(model.jnt_dofadr[model.body_jntadr[root]])
@@ -98,13 +99,14 @@ class _Legs:
         pole = math.sqrt(float(np.linalg.norm(self.model.opt.gravity)) / self.centre[2])
         wanted, feet = plan.zero_moment_point(time), plan.feet(time)
         torso = plan.mass_centre(time, pole)
-        for number in range(PASSES + 1):
+        qpos = self.joints(torso, feet)
+        qvel, acceleration, forces, point = self.dynamics(qpos, dt)
+        for _ in range(PASSES):
+            error = wanted - point
+            error[[0, -1]] = 0.0
+            torso = torso + bounded(error, pole, dt)
             qpos = self.joints(torso, feet)
             qvel, acceleration, forces, point = self.dynamics(qpos, dt)
-            if number < PASSES:
-                error = wanted - point
-                error[[0, -1]] = 0.0
-                torso = torso + bounded(error, pole, dt)
         torques = self.loads(qpos, forces, plan.load(time))
         gain, damping = self.model.actuator_gainprm[self.servos, 0], -self.model.actuator_biasprm[self.servos, 2]
         setpoints = qpos[:, self.q.ravel()] + (torques + damping * qvel[:, self.v.ravel()]) / gain
@@ -131,7 +133,7 @@ class _Legs:
             Joint rates (n, nv); the torso's acceleration (n, 2); forces of joints and of the floor (n, nv); the zero
             moment point of those of the floor (n, 2).
         """
-        model, n = copy_without_contacts(self.model), len(qpos)
+        model, n = _without_contacts(self.model), len(qpos)
         data, forces = mujoco.MjData(model), np.zeros((n, model.nv))
         moved = [*range(self.root[0], self.root[0] + 3), *self.q.ravel()]
         dofs = [*range(self.root[1], self.root[1] + 3), *self.v.ravel()]
@@ -162,10 +164,8 @@ class _Legs:
         return torques
 
 
-def copy_without_contacts(model: mujoco.MjModel) -> mujoco.MjModel:
+def _without_contacts(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return the model without contacts."""
-    import copy
-
     free = copy.copy(model)
     free.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     return free

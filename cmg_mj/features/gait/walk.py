@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 
 import numpy as np
@@ -40,14 +40,14 @@ class LegMotion:
     """Sets the legs' servos at every instant to the plan."""
 
     accelerates = False
-    edges: tuple[int, ...] = ()
+    edges: Collection[int] = ()
 
     def __init__(self, walk: Walk, timestep: float) -> None:
         self._walk, self._timestep = walk, timestep
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """See `Disturbance`: the plan's point nearest to the middle of the time until the next instant."""
-        at = round((step + 0.5 * steps) * self._timestep / PLAN_S - 0.5)
+        """See `Disturbance`."""
+        at = round(step * self._timestep / PLAN_S)
         return outside._replace(setpoints=(self._walk.servos, self._walk.setpoints[min(at, len(self._walk.time) - 1)]))
 
 
@@ -68,9 +68,9 @@ class Support:
     def __init__(self, walk: Walk, plant: Plant, first: Controller) -> None:
         self._walk, self._ticks = walk, first.law.dt / PLAN_S
         self._limit = first.law.rate_limit
-        forward = np.array([axis.line.axes[:, 0] for axis in plant.axes])[:, :2]  # across each axis, in the level torso
-        self._about = np.array([axis.line.axes[:, 1] for axis in plant.axes])[:, :2]
-        self._known = -walk.acceleration @ forward.T / plant.gravity
+        self._about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
+        across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
+        self._known = -walk.acceleration @ across.T / plant.gravity
         left, right = walk.plan.feet(walk.time)[:, :, :2]
         self._lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None]
         self._tick = 0
