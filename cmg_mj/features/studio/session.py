@@ -189,6 +189,9 @@ class StudioSession:
         self._torques = outside.torques
         if outside.acceleration is not None:
             self.model.opt.gravity[:] = self._gravity - outside.acceleration
+        if outside.setpoints is not None:
+            actuators, setpoints = outside.setpoints
+            self.data.ctrl[actuators] = setpoints
 
     def sync_to_time(self) -> int:
         """Begin again at the state's time, if someone has moved the state; return the step."""
