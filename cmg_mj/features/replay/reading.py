@@ -22,6 +22,7 @@ from cmg_mj.features.replay.log import (
     REFERENCE,
     TORQUE_MOMENTUM,
     Channels,
+    Column,
     Log,
     ReadOptions,
     Segment,
@@ -88,10 +89,7 @@ def read_log(path: Path | str, options: ReadOptions | None = None) -> Log:
         raise InputError("--delay, --window: there is no reference; name it, --columns rate=...")
     notes: list[str] = []
     time, signals = _times(path, read_table(path, columns, options), options, notes)
-    slowest = MIN_RATE_HZ
-    if "time" in columns and columns["time"].unit is None:
-        notes.append(f"the time {columns['time'].name!r} is taken as seconds")
-        slowest = BALANCED_HZ
+    slowest = _slowest(columns, notes)
     for role, delay in options.rig.delays_s.items():
         if role not in signals:
             raise InputError(f"delays_s.{role}: there is no such column; {nearest(role, signals)}")
@@ -157,13 +155,21 @@ def read_channels(path: Path | str, options: ReadOptions) -> Channels:
     if "tilt" in signals:
         signals["tilt"] = _unwrapped(signals["tilt"], notes)
     paced = signals.get("tilt", next(values for values in signals.values()))
-    _, dt, segments = sample(path, time, {**signals, "y1_rad": paced}, options, MIN_RATE_HZ, notes)
+    _, dt, segments = sample(path, time, {**signals, "y1_rad": paced}, options, _slowest(columns, notes), notes)
     longest = max(segments, key=lambda segment: len(segment.time))
     if len(segments) > 1:
         start, end = longest.time[[0, -1]] - time[0]
         notes.append(f"{start:.4g} to {end:.4g} s is used, the longest of {len(segments)} parts without a gap")
     units = {role: column.unit or "s" for role, column in columns.items() if role in options.columns}
     return Channels(path.stem, dt, longest.values, replace(options, units=units), notes)
+
+
+def _slowest(columns: Mapping[str, Column], notes: list[str]) -> float:
+    """Return the lowest rate of rows: without a unit of the times, milliseconds are not taken as seconds [Hz]."""
+    if "time" not in columns or columns["time"].unit is not None:
+        return MIN_RATE_HZ
+    notes.append(f"the time {columns['time'].name!r} is taken as seconds")
+    return BALANCED_HZ
 
 
 def _read_run(path: Path, options: ReadOptions) -> Log:

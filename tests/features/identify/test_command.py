@@ -100,6 +100,15 @@ def test_a_rig_that_no_scenario_can_have(elsewhere: None, old: str, new: str, co
     assert cmg_mj("run", "push_recovery", "--rig", "rig.toml").complaint.startswith(complaint)
 
 
+def test_milliseconds_are_not_taken_for_seconds(log: dict[str, float]) -> None:
+    heading, *rows = Path("log.csv").read_text().splitlines()
+    cells = [row.split(",", 1) for row in rows]
+    stamped = [f"{1_732_700_000_000 + round(1e3 * float(time))},{rest}" for time, rest in cells]
+    Path("log.csv").write_text("\n".join([heading.replace("time_s", "stamp"), *stamped]))
+    columns = "time=stamp,tilt=tilt_rad,rate=rate_rad_s"
+    assert "Say it, --units time=ms" in cmg_mj("identify", "log.csv", "--columns", columns).complaint
+
+
 def test_the_delay_of_a_real_gyro(elsewhere: None) -> None:
     log = ROOT / "examples/data/stepper_encoder_gyro.csv"
     columns = "time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s"
