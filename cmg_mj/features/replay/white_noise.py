@@ -137,7 +137,8 @@ def _agreeing(segments: Sequence[Segment], dt: float, correlation: float) -> tup
     model, parts = shares(found)
     slopes = 2.0 * parts / model  # of the density's logarithm by both noises': Fisher's information
     n_segments = sum(map(len, rests)) / length / 1.94  # neighbours behind Hann's window correlate
-    errors = 1.96 * np.sqrt(np.diag(np.linalg.pinv(n_segments * slopes @ slopes.T)))
+    variances = np.diag(np.linalg.pinv(n_segments * slopes @ slopes.T))
+    errors = 1.96 * np.sqrt(np.maximum(variances, 0.0))  # rounding may be below, where there is no noise
     tilt, acceleration = (
         WhiteNoise(*np.exp(size + error * np.array([0, -1, 1])).tolist())
         for size, error in zip(found, errors, strict=True)
