@@ -27,12 +27,15 @@ SHOWN = {"rad": ("deg", math.degrees(1.0)), "s": ("ms", 1e3)}
 """Unit of a parameter -> the unit that a table shows, and its factor."""
 DIGITS = 6
 """Significant digits of a rig file's numbers."""
+SHORT = 128
+"""Rows of a segment of a spectrum of noise: of few segments, the median density is far below the mean."""
 
 
 def noises(found: Geometry) -> dict[str, float]:
     """Estimate the noise of a sample of each channel: by its upper quarter of frequencies, or by the rest of the fit.
 
-    The larger counts: vibration, and what a rigid body does not explain, disturb observers at low frequencies too.
+    The larger counts: vibration, and what a rigid body does not explain, disturb observers at low frequencies too. What
+    the angular acceleration's own noise leaves at a place r, |r| times it, is not the accelerometer's.
 
     Returns:
         `tilt` [rad], `rate` [rad/s], `accelerometer 1` [m/s^2] and so on.
@@ -40,16 +43,23 @@ def noises(found: Geometry) -> dict[str, float]:
     low, channels = found.signals, found.signals.channels
 
     def by_floor(name: str) -> float:
-        power = spectrum(channels.values[name], channels.dt)[1]
+        power = spectrum(channels.values[name], channels.dt, SHORT)[1]
         return math.sqrt(0.5 / channels.dt * float(floor(power)))
 
     sizes = {name: by_floor(name) for name in ("tilt", "rate") if name in channels.values}
     impulse = np.zeros(len(low.grid))
     impulse[len(impulse) // 2] = 1.0
-    kept = float(np.linalg.norm(low.low_pass(impulse)))  # of unit white noise
+    passed = low.low_pass(impulse)
+    kept = float(np.linalg.norm(passed))  # of unit white noise
+    moved = sizes.get("rate", 0.0) * float(np.linalg.norm(np.gradient(passed, channels.dt)))
     for i, reading in enumerate(found.readings):
-        rest = found.solution.sigmas[found.channels_of(i)] / kept
-        sizes[f"accelerometer {i + 1}"] = math.hypot(*map(max, map(by_floor, reading.columns), rest)) / math.sqrt(2.0)
+        total, (across, up, *_) = sum(by_floor(name) ** 2 for name in reading.columns), found.of(i)
+        if "rate" in sizes:  # the second derivative of an angle is too noisy to tell
+            rest = (
+                float(np.sum(found.solution.sigmas[found.channels_of(i)] ** 2)) - (math.hypot(across, up) * moved) ** 2
+            )
+            total = max(total, rest / kept**2)
+        sizes[f"accelerometer {i + 1}"] = math.sqrt(total / 2.0)
     return sizes
 
 

@@ -86,11 +86,11 @@ def below(channels: Channels) -> float:
     return float(clean.max(initial=candidates[:3].max()))
 
 
-def spectrum(values: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(values: np.ndarray, dt: float, segment: int = SEGMENT) -> tuple[np.ndarray, np.ndarray]:
     """Return Welch's frequencies [Hz] and one-sided densities, without the frequency 0, of samples (n, ...)."""
     from scipy.signal import welch
 
-    f, power = welch(values, 1.0 / dt, nperseg=min(SEGMENT, len(values)), axis=0)
+    f, power = welch(values, 1.0 / dt, nperseg=min(segment, len(values)), axis=0)
     return f[1:], power[1:]
 
 

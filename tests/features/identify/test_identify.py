@@ -10,11 +10,12 @@ import pytest
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.identify.identify import Identified, identify_rig
+from cmg_mj.features.identify.report import noises
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.scenario.schema import Scenario
-from tests.features.identify.simulated import SimulatedLog, off, simulated_log, swaying
+from tests.features.identify.simulated import ACCELEROMETER_NOISE, SimulatedLog, off, simulated_log, swaying
 
 DRIVEN = {"inertia J": 0.0071, "m g l": 0.64, "equilibrium": 0.01, "damping": 0.008, "dry friction": 0.001}
 WHEEL = {"wheel's damping": 1e-4, "wheel's dry friction": 0.005}
@@ -59,6 +60,16 @@ def test_a_place_is_found_to_a_millimetre() -> None:
         assert abs(number.value - truth[number.name]) < min(bound, 2.0 * number.error)
         assert number.told
     assert numbers["accelerometer 1 scale 2"].value * truth["accelerometer 1 scale 2"] > 0.0  # not turned round
+
+
+@pytest.mark.parametrize(("gyro", "off"), [(0.0, 0.1), (0.01, 0.3)])
+def test_the_noise_of_an_accelerometer_is_not_the_gyros(gyro: float, off: float) -> None:
+    """A gyro's noise is an angular acceleration's, which the place multiplies: here to 2.5 times the accelerometer's."""
+    channels, values, _ = simulated_log(*swaying(15.0), seed=2)
+    values["rate"] += gyro * np.random.default_rng(1).normal(size=len(values["rate"]))
+    sizes = noises(identify_rig(channels).geometry)
+    for number in (1, 2):
+        assert sizes[f"accelerometer {number}"] == pytest.approx(ACCELEROMETER_NOISE, rel=off)
 
 
 def test_a_pendulum_with_a_wheel() -> None:
