@@ -64,7 +64,7 @@ def test_a_place_is_found_to_a_millimetre() -> None:
 
 @pytest.mark.parametrize(("gyro", "off"), [(0.0, 0.1), (0.01, 0.3)])
 def test_the_noise_of_an_accelerometer_is_not_the_gyros(gyro: float, off: float) -> None:
-    """A gyro's noise is an angular acceleration's, which the place multiplies: here to 2.5 times the accelerometer's."""
+    """A gyro's noise is an angular acceleration's, times the place: here 2.5 times the accelerometer's own."""
     channels, values, _ = simulated_log(*swaying(15.0), seed=2)
     values["rate"] += gyro * np.random.default_rng(1).normal(size=len(values["rate"]))
     sizes = noises(identify_rig(channels).geometry)
