@@ -100,7 +100,8 @@ class PairTilt:
     @property
     def is_apart(self) -> bool:
         """Whether both are apart, and on a ray in their order."""
-        return self.r_inner < self.r_outer if self.is_radial else self.span >= MIN_SPAN_M
+        in_order = not self.is_radial or abs(self.r_inner) <= abs(self.r_outer)
+        return in_order and self.span >= MIN_SPAN_M
 
     @cached_property
     def _weights(self) -> tuple[Scalar, Scalar]:

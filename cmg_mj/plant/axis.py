@@ -286,7 +286,7 @@ def _pair(model: mujoco.MjModel, prefix: str, point: np.ndarray, direction: np.n
         radial = abs(math.atan2(c, r)) <= math.radians(MOUNTED_DEG)
         radii.append(math.hypot(*(arm - (arm @ direction) * direction)) if radial else r)
         beside.append(0.0 if radial else c)
-        angles.append(0.0 if abs(angle) <= math.radians(MOUNTED_DEG) else angle)
+        angles.append(0.0 if radial and abs(angle) <= math.radians(MOUNTED_DEG) else angle)
     return PairTilt(*radii, across=tuple(beside), angles=tuple(angles))
 
 

@@ -153,7 +153,8 @@ class RigChecker:
             if kind == "accelerometer":  # one that is mounted otherwise, the tilt estimate knows
                 arm = data.site_xpos[site] - pivot
                 aslant = _degrees_between(axes[:, 2], arm - (arm @ along) * along)
-                beside = max(angle for angle in (aslant, _degrees_between(arm, line), 0.0) if angle <= MOUNTED_DEG)
+                lies = _degrees_between(arm, line)
+                beside = max((a for a in (aslant, lies) if a <= MOUNTED_DEG >= lies), default=0.0)
             if off > MOUNTED_DEG:
                 yield f"the site of sensor {name!r} must have its y axis along the tilt axis; it is {off:.3g} deg off"
             elif max(off, beside) > TRUE_DEG:

@@ -173,7 +173,7 @@ def test_accelerometers_by_settings_are_those_of_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(by_setting["y1_rad"], run(f"plant.model={path}")["y1_rad"], rtol=0.0, atol=1e-9)
 
 
-ASIDE = {"inner": (0.12, 0.15, 90.0), "outer": (-0.03, -0.02, -100.0)}
+ASIDE = {"inner": (0.12, 0.15, 4.0), "outer": (-0.03, -0.02, -100.0)}
 """Up and across from the pivot [m], and the angle from across to the first axis [deg]."""
 BY_SETTINGS = {
     f"accelerometer_{name}_{field}": value
@@ -248,3 +248,12 @@ def test_the_inner_one_is_the_inner_one(arguments: tuple, complaint: str) -> Non
     values = dict(zip(fields, arguments, strict=False))
     with pytest.raises(InputError, match=complaint):
         load_plant(**values)
+
+
+def test_two_below_the_pivot_are_in_order_too() -> None:
+    plant = load_plant(accelerometer_inner_m=-0.05, accelerometer_outer_m=-0.2, lock_thrust_bearing=True)
+    data = plant.new_data()
+    data.qpos[plant.tilt] = plant.tilt_zero + 0.2
+    mujoco.mj_forward(plant.model, data)
+    forces = plant.ideal_readings(data.sensordata.tolist(), data.qvel.tolist()).accelerations
+    assert plant.pair_tilt(*forces) == pytest.approx(0.2, abs=1e-9)
