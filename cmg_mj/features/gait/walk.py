@@ -47,8 +47,14 @@ class LegMotion:
 
     def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
         """See `Disturbance`."""
-        at = round(step * self._timestep / PLAN_S)
-        return outside._replace(setpoints=(self._walk.servos, self._walk.setpoints[min(at, len(self._walk.time) - 1)]))
+        now, then = (self._setpoints(n * self._timestep) for n in (step, step + steps))
+        return outside._replace(setpoints=(self._walk.servos, (then - now) / (steps * self._timestep)))
+
+    def _setpoints(self, time):
+        at = time / PLAN_S
+        i = min(int(at), len(self._walk.time) - 2)
+        a = min(at - i, 1.0)
+        return (1-a) * self._walk.setpoints[i] + a * self._walk.setpoints[i+1]
 
 
 def support(gait: Gait, plant: Plant) -> Callable[[Controller], Support] | None:
