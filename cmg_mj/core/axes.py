@@ -7,10 +7,13 @@ from collections.abc import Callable, Sequence
 
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.types import MultiAxisReading
+from cmg_mj.core.types import MultiAxisReading, Setpoints
 
-AxesStage = Callable[[Sequence[Controller], MultiAxisReading], None]
-"""An effect between the axes: it turns the gimbals of all of them after their decisions, once a control tick."""
+AxesStage = Callable[[Sequence[Controller], MultiAxisReading], Setpoints | None]
+"""An effect between the axes: it turns the gimbals of all of them after their decisions, once a control tick.
+
+It returns what it moves beside the gimbals, if anything.
+"""
 
 
 class MultiAxisController:
@@ -44,6 +47,8 @@ class MultiAxisController:
         """Forget everything: the next update is the first tick of a run with the same seed."""
         for part in self.axes:
             part.reset()
+        self.setpoints: Setpoints | None = None
+        """What the stage between the axes moves beside the gimbals, since the last tick."""
         self.step: int | None = None
         """The physics step of the last update."""
         self._between = None if self._make_between is None else self._make_between(self.axes[0])
@@ -79,7 +84,7 @@ class MultiAxisController:
         for part in self.axes:
             part.control(step)
         if self._between is not None:
-            self._between(self.axes, self._ideals)
+            self.setpoints = self._between(self.axes, self._ideals)
 
 
 ControllerLike = Controller | MultiAxisController

@@ -10,7 +10,17 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.runners import LawRunner, ObserverRunner
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.tilt import GimbalAngle, PairTilt
-from cmg_mj.core.types import Forces, IdealReading, Law, Measurement, Observer, State, feedback_state, reads_gyro
+from cmg_mj.core.types import (
+    Forces,
+    IdealReading,
+    Law,
+    Measurement,
+    Observer,
+    Setpoints,
+    State,
+    feedback_state,
+    reads_gyro,
+)
 
 Feedback = Literal["observer", "fog", "truth"]
 AngleSource = Literal["measured", "estimated"]
@@ -129,6 +139,9 @@ class Controller:
         self._law = LawRunner(law, self._single)
         self.reset()
 
+    setpoints: Setpoints | None = None
+    """Of several axes, what a stage between them moves beside the gimbals."""
+
     @property
     def axes(self) -> Sequence[Controller]:
         """Controllers of the axes; for one axis, the controller itself."""
@@ -150,6 +163,8 @@ class Controller:
         """Coriolis part of the measured angular acceleration, which the stage between axes sets [rad/s^2]."""
         self.known_tilt: Scalar | None = None
         """Tilt by which accelerometers err in a planned motion, which a stage between axes sets [rad]."""
+        self.contact: Scalar | None = None
+        """Angular acceleration by contacts, held until the next tick, which a stage between axes sets [rad/s^2]."""
         self.step: int | None = None
         """The physics step of the last update."""
         self.steps_per_sample = math.gcd(self.period, *(sensor.steps_per_sample for sensor in self._sampled))
@@ -236,6 +251,8 @@ class Controller:
         y.acceleration = acceleration
         if self.reads_gyro:
             y.gyro = gyro
+        if self.contact is not None:
+            y.contact = self.contact
         time = step * self.timestep
         if self.tick is None:
             estimates, held = self._observers.start(y, time), 0.0 * y1

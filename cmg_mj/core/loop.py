@@ -11,7 +11,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axes import ControllerLike
 from cmg_mj.core.controller import Tick
-from cmg_mj.core.types import IdealReading, MultiAxisReading
+from cmg_mj.core.types import IdealReading, MultiAxisReading, Setpoints
 
 
 class Outside(NamedTuple):
@@ -21,8 +21,8 @@ class Outside(NamedTuple):
     """About each axis, one for all worlds or (n_worlds,) [N m]."""
     acceleration: Sequence[Scalar] | None = None
     """The pivot's: x, y, z, likewise; None: it stays what it was, at first zero [m/s^2]."""
-    setpoints: tuple[Sequence[int], np.ndarray] | None = None
-    """Numbers of actuators that are no gimbal's and no flywheel's, and their controls; None: they stay."""
+    setpoints: Setpoints | None = None
+    """Controls of other actuators; None: they stay."""
 
 
 class Disturbance(Protocol):
@@ -244,6 +244,8 @@ class ControlLoop:
                 for world, message in stop_failed(part.tick):
                     self.endings[world] = Ending(self.step, message=message)
             physics.command(part.gimbal_rate, axis)
+        if self.controller.setpoints is not None:
+            physics.control(*self.controller.setpoints)
 
     def advance(self) -> None:
         """Take the physics to the next instant."""

@@ -33,6 +33,8 @@ class NoiseStream(IntEnum):
     """The accelerometers' broadband vibration."""
     WHEEL_TONES = 9
     """The phases of the tones that flywheels make in the accelerometers."""
+    FOOT_SWITCH = 10
+    """How the contacts of foot switches bounce."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""

@@ -32,6 +32,8 @@ class Measurement(_Angles):
 
     acceleration: Scalar = math.nan
     gyro: Scalar = math.nan
+    contact: Scalar | None = None
+    """Angular acceleration that contacts add to f2 of the reduced model, held since the sample before [rad/s^2]."""
 
     def __new__(
         cls, y1: Scalar, y2: Scalar, acceleration: Scalar = math.nan, gyro: Scalar | None = None
@@ -213,6 +215,10 @@ STANDARD_GRAVITY = 9.80665  # m/s^2, the g of a datasheet's mg
 
 Forces = Sequence[Scalar] | np.ndarray
 """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
+
+
+Setpoints = tuple[Sequence[int], np.ndarray]
+"""Numbers of actuators that are no gimbal's and no flywheel's, and their controls, (n,) or (n, n_worlds)."""
 
 
 class IdealReading(NamedTuple):

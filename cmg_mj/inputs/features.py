@@ -61,8 +61,7 @@ FEATURES = {
     ),
     "gait": Feature(
         section="cmg_mj.features.gait:Gait",
-        disturbance="cmg_mj.features.gait.walk:leg_motion",
-        between="cmg_mj.features.gait.walk:support",
+        between="cmg_mj.features.gait.walk:walking",
     ),
     "pivot": Feature(
         section="cmg_mj.features.pivot:Pivot",

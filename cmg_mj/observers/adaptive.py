@@ -170,6 +170,8 @@ class Adaptive:
         tilt, gimbal = 0.5 * (before[0] + y1), 0.5 * (before[1] + y2)
         drift, gain, damping = model.terms(tilt + math.radians(self.known_bias_deg), gimbal)
         a = -u * damping
+        if y.contact is not None:
+            drift = drift + y.contact
         B0 = self._acting(tilt, model.inertia(gimbal))
         forward = _midpoint_rule(h, l1, l2, a)  # of v' = (A + L C) v + (w1, w2), A + L C = [[l1, 1], [l2, a]]
 

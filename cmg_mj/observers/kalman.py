@@ -152,17 +152,18 @@ class Kalman:
 
     def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, TorqueEstimate]:
         """Advance by one sample period."""
-        x, P = self._predicted(state, u)
+        x, P = self._predicted(state, u, y.contact)
         v1, v2 = self.measurement_noise
         x, P = _corrected(x, P, 0, y[0], v1)
         x, P = _corrected(x, P, 2, y[1], v2)
         return State(*x, P), TorqueEstimate(*x)
 
-    def _predicted(self, state: State, u: Scalar) -> tuple[Four, Covariance]:
+    def _predicted(self, state: State, u: Scalar, contact: Scalar | None) -> tuple[Four, Covariance]:
         """Return the state and its covariance a sample period later: F P F' + Q."""
         x1, x2, x3, torque, P = state
         p11, p12, p13, p14, p22, p23, p24, p33, p34, p44 = P
         f2, a, b, c, d = self.model.slopes(x1, x2, x3, u, torque)
+        f2 = f2 if contact is None else f2 + contact
         h, phi, psi, chi = self._integrals(a, b)
 
         jerk = a * x2 + c * u  # f2' but for b f2, which phi has

@@ -97,6 +97,7 @@ class LinearTimeVarying:
         """Advance by one sample period."""
         for left in range(self._pieces, 1, -1):
             along = Measurement(*(a + (b - a) / left for a, b in zip(state.y, y, strict=True)))
+            along.contact = y.contact
             state = self._piece(state, along, u)
         state = self._piece(state, y, u)
         return state, Estimate(state[0], state[1], state[2])

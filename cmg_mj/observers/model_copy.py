@@ -68,6 +68,8 @@ def stages(
     middle = y1_middle, drift + u * gain, u * damping + friction
     drift, gain, damping = terms = model.terms(y1 + bias, y2)
     end = y1, drift + u * gain, u * damping + friction
+    if y.contact is not None:
+        begin, middle, end = ((angle, known + y.contact, loss) for angle, known, loss in (begin, middle, end))
     return begin, middle, end, terms
 
 

@@ -129,8 +129,8 @@ class ManyWorlds:
         self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
 
     def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
-        """Set the controls of other actuators, alike in all worlds."""
-        self._ctrl[:, actuators] = setpoints
+        """Set the controls of other actuators, one for all worlds or (n, n_worlds)."""
+        self._ctrl[:, actuators] = setpoints.T
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes, one for all or (n_worlds,) each; return arrays (n_worlds,) [N m]."""

@@ -70,6 +70,9 @@ def _hold(plant: Plant, controller: ControllerLike, data: mujoco.MjData) -> None
         if part.gimbal_rate is not None:
             for module in axis.modules:
                 data.ctrl[module.servo] = module.direction * part.gimbal_rate
+    if controller.setpoints is not None:
+        actuators, controls = controller.setpoints
+        data.ctrl[actuators] = controls
 
 
 class ControlCallback:

@@ -17,8 +17,8 @@ from cmg_mj.plant.mjcf import data_at_keyframe, set_control_callback
 
 SIDES = "left", "right"
 JOINTS = "hip_roll", "hip_pitch", "telescope"
-PASSES = 4
-"""Corrections of the torso's way for the legs' momenta; each leaves a hundredth of what was left."""
+PASSES = 6
+"""Corrections of the torso's way for the legs' momenta and for feet that roll; each leaves a tenth of what was left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,23 +28,29 @@ class Walk:
     Attributes:
         plan: Its plan.
         time: (n,) [s].
+        feet: Places of both soles, (2, n, 3) [m].
         qpos: Joint positions, (n, nq).
         qvel: Joint rates, (n, nv).
         torques: Of the servos of the legs' joints, (n, 6) [N m, N].
         zero_moment_point: That of the whole robot, by its inverse dynamics, (n, 2) [m].
         servos: Their addresses in ctrl, (6,).
         setpoints: What they are set to, (n, 6).
+        leaning: By how much those change while the torso moves by 1 m, x and y, (n, 6, 2).
+        height: Of the mass centre [m].
         acceleration: Of the torso, x and y, (n, 2) [m/s^2].
     """
 
     plan: Plan
     time: np.ndarray
+    feet: np.ndarray
     qpos: np.ndarray
     qvel: np.ndarray
     torques: np.ndarray
     zero_moment_point: np.ndarray
     servos: np.ndarray
     setpoints: np.ndarray
+    leaning: np.ndarray
+    height: float
     acceleration: np.ndarray
 
 
@@ -52,7 +58,8 @@ def plan_walk(model: mujoco.MjModel, key: int, gait: Gait, dt: float) -> Walk:
     """Plan a walk for a robot with the joints LEG/hip_roll, LEG/hip_pitch and LEG/telescope, left and right.
 
     The torso stays level and at its height. Its way is that of the mass centre of the linear inverted pendulum,
-    corrected until the zero moment point of the whole robot is the planned one.
+    corrected until the zero moment point of the whole robot is the planned one. The feet are balls that roll without
+    slip on the floor, as high as their sites at the keyframe.
 
     Args:
         model: The robot.
@@ -81,6 +88,7 @@ class _Legs:
                 f"gait.steps: takes a free robot with sites LEG/foot, and joints and actuators "
                 f"LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
             )
+        self.named = joints
         self.model, self.key, self.feet, self.servos = model, key, feet, np.array(servos)
         self.root = int(model.jnt_qposadr[model.body_jntadr[root]]), int(model.jnt_dofadr[model.body_jntadr[root]])
         self.q = model.jnt_qposadr[joints].reshape(2, 3)
@@ -97,20 +105,26 @@ class _Legs:
         plan = Plan(gait, float(self.soles[0, 1] - self.torso[1]))
         time = dt * np.arange(math.ceil(plan.duration_s / dt) + 1)
         pole = math.sqrt(float(np.linalg.norm(self.model.opt.gravity)) / self.centre[2])
-        wanted, feet = plan.zero_moment_point(time), plan.feet(time)
-        torso = plan.mass_centre(time, pole)
-        qpos = self.joints(torso, feet)
-        qvel, acceleration, forces, point = self.dynamics(qpos, dt)
+        planned, shares = plan.feet(time), plan.load(time)
+        torso, feet = plan.mass_centre(time, pole), planned
         for _ in range(PASSES):
-            error = wanted - point
-            error[[0, -1]] = 0.0
-            torso = torso + bounded(error, pole, dt)
+            qpos = self.joints(torso, feet)
+            feet = planned + plan.rolled(time, self.ways(qpos))
             qpos = self.joints(torso, feet)
             qvel, acceleration, forces, point = self.dynamics(qpos, dt)
-        torques = self.loads(qpos, forces, plan.load(time))
+            error = np.einsum("fn,fni->ni", shares, feet[:, :, :2]) - point
+            error[[0, -1]] = 0.0
+            torso = torso + bounded(error, pole, dt)
+        torques = self.loads(qpos, forces, shares)
         gain, damping = self.model.actuator_gainprm[self.servos, 0], -self.model.actuator_biasprm[self.servos, 2]
+        self._check_reach(time, qpos)
         setpoints = qpos[:, self.q.ravel()] + (torques + damping * qvel[:, self.v.ravel()]) / gain
-        return Walk(plan, time, qpos, qvel, torques, point, self.servos, setpoints, acceleration)
+        at_rest, small = qpos[:, self.q.ravel()], 1e-4 * np.eye(2)
+        leaning = [(self.joints(torso + d, feet)[:, self.q.ravel()] - at_rest) / 1e-4 for d in small]
+        return Walk(
+            plan, time, feet, qpos, qvel, torques, point, self.servos, setpoints, np.stack(leaning, axis=-1),
+            float(self.centre[2]), acceleration,
+        )
 
     def joints(self, torso: np.ndarray, feet: np.ndarray) -> np.ndarray:
         """Find the joints by which the soles are where they should be, (n, nq)."""
@@ -125,6 +139,24 @@ class _Legs:
                 [np.arctan2(y, -z), -np.arcsin(x / length), length - self.reach[leg]]
             )
         return qpos
+
+    def ways(self, qpos: np.ndarray) -> np.ndarray:
+        """Return how far balls under the legs would have rolled from the start, (2, n, 3) [m]."""
+        roll, pitch = (qpos[:, self.q[:, i]].T for i in range(2))
+        radius = self.soles[:, 2:]  # of a foot that is a ball: its centre's height over the floor
+        return np.stack([radius * pitch, -radius * roll, 0.0 * roll], axis=-1)
+
+    def _check_reach(self, time: np.ndarray, qpos: np.ndarray) -> None:
+        """Refuse joint positions beyond the joints' ranges."""
+        for joint, address in zip(self.named, self.q.ravel(), strict=True):
+            low, high = self.model.jnt_range[joint]
+            way = qpos[:, address]
+            worst = int(np.argmax(np.maximum(low - way, way - high)))
+            if self.model.jnt_limited[joint] and not low <= way[worst] <= high:
+                raise InputError(
+                    f"gait: the plan takes {self.model.joint(joint).name} to {way[worst]:.3g} at t = {time[worst]:.2f} "
+                    f"s, and its range is {low:.3g} to {high:.3g}; take shorter steps, or lift the feet less"
+                )
 
     def dynamics(self, qpos: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Find what moves the robot so, by MuJoCo's inverse dynamics without contacts.

@@ -7,7 +7,6 @@ only bounded answer to a zero moment point that runs straight between its corner
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -43,7 +42,7 @@ class Plan:
 
     Attributes:
         gait: The gait.
-        half_width: Distance of each foot from the middle [m].
+        half_width: Distance of each foot from the middle at the start [m].
     """
 
     gait: Gait
@@ -54,11 +53,13 @@ class Plan:
         """The steps, the right foot's first; the last one brings the feet together."""
         gait, feet = self.gait, [np.array([0.0, self.half_width]), np.array([0.0, -self.half_width])]
         steps, time, foot = [], gait.stand_s, RIGHT
+        half = self.half_width if gait.width_m is None else 0.5 * gait.width_m
+        side = half, -half
         for number in range(gait.steps):
             time += gait.double_s
             stance = feet[1 - foot]
             ahead = gait.step_length_m if number < gait.steps - 1 else 0.0
-            end = np.array([stance[0] + ahead, feet[foot][1]])
+            end = np.array([stance[0] + ahead, side[foot]])
             steps.append(Step(foot, time, time + gait.single_s, feet[foot], end, stance))
             feet[foot], time, foot = end, time + gait.single_s, 1 - foot
         return steps
@@ -105,11 +106,31 @@ class Plan:
         soles[LEFT, :, 1], soles[RIGHT, :, 1] = self.half_width, -self.half_width
         for step in self.steps:
             share = np.clip((time - step.lifts) / (step.lands - step.lifts), 0.0, 1.0)
-            moved = _quintic((share - SWING_FROM) / SWING_SHARE)
             later = share > 0.0
-            soles[step.foot, later, :2] = step.start + moved[later, None] * (step.end - step.start)
+            moved = self._moved(step, time[later])[:, None]
+            soles[step.foot, later, :2] = step.start + moved * (step.end - step.start)
             soles[step.foot, :, 2] += 16.0 * self.gait.lift_m * (share * (1.0 - share)) ** 2
         return soles
+
+    def rolled(self, time: np.ndarray, ways: np.ndarray) -> np.ndarray:
+        """Return by how much both soles are beside their places because they roll while they stand, (2, n, 3) [m].
+
+        Args:
+            time: (n,) [s].
+            ways: How far they would have rolled since the start, (2, n, 3) [m].
+        """
+        beside = ways - ways[:, :1]
+        for step in self.steps:
+            foot, lifts, lands = step.foot, *np.searchsorted(time, [step.lifts, step.lands])
+            left = 1.0 - self._moved(step, time[lifts:lands])
+            beside[foot, lifts:lands] = left[:, None] * beside[foot, lifts]
+            beside[foot, lands:] = ways[foot, lands:] - ways[foot, lands]
+        return beside
+
+    @staticmethod
+    def _moved(step: Step, time: np.ndarray) -> np.ndarray:
+        """Return the share of its way that a foot has moved."""
+        return _quintic(((time - step.lifts) / (step.lands - step.lifts) - SWING_FROM) / SWING_SHARE)
 
     def load(self, time: np.ndarray) -> np.ndarray:
         """Return the share of the weight that each foot carries, (2, n)."""
@@ -119,11 +140,6 @@ class Plan:
         for step in self.steps:
             of_left[(time >= step.lifts) & (time <= step.lands)] = float(step.foot == RIGHT)
         return np.stack([of_left, 1.0 - of_left])
-
-    def stance(self, times: Sequence[float]) -> Iterator[int | None]:
-        """Yield the only foot that is planned to stand at each time, None for both."""
-        for time in times:
-            yield next((1 - step.foot for step in self.steps if step.lifts < time < step.lands), None)
 
 
 def _quintic(share: np.ndarray) -> np.ndarray:
