@@ -163,6 +163,8 @@ class Controller:
         """Coriolis part of the measured angular acceleration, which the stage between axes sets [rad/s^2]."""
         self.known_tilt: Scalar | None = None
         """Tilt by which accelerometers err in a planned motion, which a stage between axes sets [rad]."""
+        self.bias: Scalar | None = None
+        """Equilibrium bias, added to the tilt that is fed back, which a stage between axes sets [rad]."""
         self.contact: Scalar | None = None
         """Angular acceleration by contacts, held until the next tick, which a stage between axes sets [rad/s^2]."""
         self.step: int | None = None
@@ -264,6 +266,8 @@ class Controller:
         for remember in self.memories:
             self._law.state = remember(step, estimate, self._law.state)
         x1, x2, x3 = (y1, estimate[1], y2) if self.angle_source == "measured" else estimate[:3]
+        if self.bias is not None:
+            x1 = x1 + self.bias
         if self.feedback != "observer":
             x2 = fog if self.feedback == "fog" else rate
         u, x_e = self._law.decide(y, feedback_state(x1, x2, x3, estimate[3:]), held, time)

@@ -22,8 +22,8 @@ class Gait(Section):
         lift_m: Height to which a foot is lifted [m].
         stand_s: Time on both feet at rest, before the first step and after the last one [s].
         width_m: Distance between the lines of both feet, from the first steps on; without it that of the keyframe [m].
-        lean_s: Time constant in which the torso is moved until the mass centre stands over the feet, by what the law's
-            integrator finds; 0: it stays where it is planned [s].
+        lean_s: Time constant in which the torso is moved until the mass centre stands over the feet, by the equilibrium
+            bias that is found; 0: none is looked for [s].
         switch_force_n: Force from which a foot switch is closed [N].
         switch_delay_s: Delay of the foot switches [s].
         switch_bounce_s: Time for which a foot switch bounces after a change [s].
@@ -36,7 +36,7 @@ class Gait(Section):
     lift_m: Annotated[float, Field(gt=0.0, le=0.5)] = 0.02
     stand_s: Annotated[float, Field(ge=0.5, le=60.0)] = 1.25
     width_m: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
-    lean_s: NonNegative = 0.0
+    lean_s: NonNegative = 1.0
     switch_force_n: Positive = 5.0
     switch_delay_s: Latency = 0.005
     switch_bounce_s: Latency = 0.005

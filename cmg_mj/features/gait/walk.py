@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar, clip, where
+from cmg_mj.core.arrays import clip, dot, where
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.types import MultiAxisReading, Setpoints
 from cmg_mj.features.gait import Gait
+from cmg_mj.features.gait.lean import Lean
 from cmg_mj.features.gait.legs import Walk, plan_walk
 from cmg_mj.features.gait.switches import FootSwitches
 from cmg_mj.plant.plant import Plant
@@ -22,8 +22,6 @@ RECENTRED_S = 1.0
 """Time constant in which gimbals come back that turn nothing: the feet hold that direction [s]."""
 CAUGHT_S = 0.02
 """Time constant in which a rate that the feet hold leaves the observers' model [s]."""
-MOST_LEAN = math.radians(3.0)
-"""The torso is moved for no larger bias [rad]."""
 
 
 @cache
@@ -44,67 +42,59 @@ class Walking:
     feet alone, l, and not about n across it: the commands' part about it is held, and the gimbals' part across comes
     back to the middle. What the feet then add to f2 of the reduced models is -n (n . f2 + n . x2/`CAUGHT_S`).
 
-    The torso's planned acceleration a makes accelerometers show a tilt of -a/g, which is taken off.
-
-    An equilibrium bias e shifts the mass centre by e times its height. The law's integrator settles at
-    `trim_gain` e; the torso is moved against that with `Gait.lean_s`.
+    The torso's planned acceleration a makes accelerometers show a tilt of -a/g, which is taken off. The setpoints of
+    the legs' servos run straight from tick to tick: their controls are the rates (`<intvelocity>`).
     """
 
     def __init__(self, walk: Walk, gait: Gait, plant: Plant, first: Controller) -> None:
-        self._walk, self._gait, self._dt = walk, gait, first.law.dt
+        self._walk, self._dt = walk, first.law.dt
         self._switches = FootSwitches(gait, first)
         self._models = [axis.reduced for axis in plant.axes]
-        self._about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
-        self._across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
-        self._known = -walk.acceleration @ self._across.T / plant.gravity
+        about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
+        across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
+        self._known = -walk.acceleration @ across.T / plant.gravity
         left, right = walk.feet[:, :, :2]
-        self._lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None]
-        self._lean: Sequence[Scalar] = [np.zeros(np.shape(first.world_ids))] * len(plant.axes)
+        self._lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None] @ about.T
+        self._leaning = -walk.height * walk.leaning @ across.T
+        zero = 0.0 if isinstance(first.world_ids, int) else np.zeros(len(first.world_ids))
+        self._lean = Lean(self._models, self._dt, gait.lean_s, walk.height / plant.gravity, zero)
 
     def __call__(self, controllers: Sequence[Controller], ideals: MultiAxisReading) -> Setpoints:
         """Turn the gimbals, move the legs, and tell the controllers what they will know at the next tick."""
-        first, dt = controllers[0], self._dt
-        time = (first.step or 0) * first.timestep
-        stands = self._switches(ideals.touch)
-        both = stands[0] & stands[1]
-        l = self._about @ self._at(self._lines, time)
-        n = np.array([-l[1], l[0]])
+        dt, time = self._dt, (controllers[0].step or 0) * controllers[0].timestep
+        left, right = self._switches(ideals.touch)
+        both = left & right
+        line = self._at(self._lines, time)
+        across = np.array([-line[1], line[0]])
         ticks = [part.tick for part in controllers if part.tick is not None]
-        held = sum(share * tick.u for share, tick in zip(l, ticks, strict=True))
-        back = -sum(share * tick.y2 for share, tick in zip(n, ticks, strict=True)) / RECENTRED_S
-        commands = []
-        for part, tick, a, b in zip(controllers, ticks, l, n, strict=True):
+        held = dot(line, [tick.u for tick in ticks])
+        back = -dot(across, [tick.y2 for tick in ticks]) / RECENTRED_S
+        for i, part in enumerate(controllers):
             limit = part.law.rate_limit
-            commands.append(clip(where(both, a * held + b * back, tick.u), -limit, limit))
-        f2 = 0.0
-        for share, model, tick, u in zip(n, self._models, ticks, commands, strict=True):
+            u = clip(where(both, line[i] * held + across[i] * back, ticks[i].u), -limit, limit)
+            part.tick = ticks[i] = ticks[i]._replace(u=u)
+        caught = []
+        for model, tick in zip(self._models, ticks, strict=True):
             x1, x2, x3 = tick.estimates[0][:3]
-            f2 = f2 + share * (model.tilt_acceleration(x1, x2, x3, u) + x2 / CAUGHT_S)
-        known = self._at(self._known, time + 0.5 * dt)  # the samples are means
-        for part, tick, u, b, tilt in zip(controllers, ticks, commands, n, known, strict=True):
-            part.tick = tick._replace(u=u)
-            part.known_tilt = float(tilt)
-            part.contact = where(both, -b * f2, 0.0)
-            part.command_rate(u)
-        return self._walk.servos, self._legs(controllers, ticks, time)
+            caught.append(model.tilt_acceleration(x1, x2, x3, tick.u) + x2 / CAUGHT_S)
+        contact = where(both, -dot(across, caught), 0.0)
+        before = self._lean.lean.copy()
+        self._lean.update(ticks, line, both)
+        known = self._at(self._known, time + 0.5 * dt)  # a sample is the mean since the one before
+        for i, part in enumerate(controllers):
+            part.known_tilt = known[i] + self._lean.known_tilt[i]
+            part.bias = self._lean.bias[i] - self._lean.lean[i]
+            part.contact = across[i] * contact
+            part.command_rate(ticks[i].u)
+        return self._walk.servos, self._legs(time, before, self._lean.lean)
 
-    def _legs(self, controllers, ticks, time) -> np.ndarray:
-        """Return the rates at which the servos' setpoints are to run until the next tick."""
-        dt, walk = self._dt, self._walk
-        now, then = self._at(walk.setpoints, time), self._at(walk.setpoints, time + dt)
-        rates = (then - now) / dt
-        if not self._gait.lean_s:
-            return rates
-        move, before = self._at(walk.leaning, time + dt), self._at(walk.leaning, time)
-        lean = []
-        for part, tick, last in zip(controllers, ticks, self._lean, strict=True):
-            found = tick.x_e / getattr(part.law, "trim_gain", math.inf)
-            lean.append(clip(last + dt / self._gait.lean_s * found, -MOST_LEAN, MOST_LEAN))
-        was, self._lean = self._lean, lean
-        for across, last, now in zip(self._across, was, lean, strict=True):
-            moved = np.multiply.outer(now, move @ across) - np.multiply.outer(last, before @ across)
-            rates = rates - walk.height / dt * moved
-        return rates.T
+    def _legs(self, time: float, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
+        """Return the rates at which the servos' setpoints run until the next tick, (6,) or (6, n_worlds)."""
+        ends = []
+        for at, leans in ((time, before), (time + self._dt, after)):
+            moved = map(np.multiply.outer, leans, self._at(self._leaning, at).T)
+            ends.append(sum(moved, self._at(self._walk.setpoints, at)))
+        return ((ends[1] - ends[0]) / self._dt).T
 
     def _at(self, table: np.ndarray, time: float) -> np.ndarray:
         """Read a table of the plan at a time [s]; after its end it stays."""
