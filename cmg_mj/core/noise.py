@@ -35,6 +35,8 @@ class NoiseStream(IntEnum):
     """The phases of the tones that flywheels make in the accelerometers."""
     FOOT_SWITCH = 10
     """How the contacts of foot switches bounce."""
+    FLOOR = 11
+    """The heights of a floor's tiles."""
 
     def on_axis(self, axis: int) -> int:
         """Return the number of the stream of one axis of several."""

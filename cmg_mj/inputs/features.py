@@ -43,6 +43,10 @@ class Feature(NamedTuple):
     """Makes what acts from outside: (sections, plants, seed, worlds) -> Disturbance."""
     between: str = ""
     """Makes the stage between the axes: (section, plant) -> (first controller) -> stage."""
+    in_world: str = ""
+    """Makes the plant of a world: (section, plant, seed, world) -> plant."""
+    figures: str = ""
+    """Makes what sums up figures of a run: (section, plant, worlds, control period) -> sums with `add`, `figures`."""
     judge: str = ""
     """Says what `cmg-mj check` prints of it: (design, plant) -> Judgement."""
     commands: Mapping[str, Command] = {}
@@ -61,7 +65,10 @@ FEATURES = {
     ),
     "gait": Feature(
         section="cmg_mj.features.gait:Gait",
+        edit="cmg_mj.features.gait.tiles:lay_tiles",
+        in_world="cmg_mj.features.gait.tiles:with_heights",
         between="cmg_mj.features.gait.walk:walking",
+        figures="cmg_mj.features.gait.figures:walk_figures",
     ),
     "pivot": Feature(
         section="cmg_mj.features.pivot:Pivot",

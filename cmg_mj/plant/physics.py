@@ -56,6 +56,10 @@ class OneWorld:
         """Set the controls of other actuators."""
         self._ctrl[actuators] = setpoints
 
+    def power(self) -> np.ndarray:
+        """Return the power of each actuator at the last physics step, (n,) [W]."""
+        return self.data.actuator_force * self.data.actuator_velocity
+
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes [N m]."""
         apply_torques(self._applied, self._lines, torques)
@@ -131,6 +135,10 @@ class ManyWorlds:
     def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
         """Set the controls of other actuators, one for all worlds or (n, n_worlds)."""
         self._ctrl[:, actuators] = setpoints.T
+
+    def power(self) -> np.ndarray:
+        """Return the power of each actuator at the last physics step, (n, n_worlds) [W]."""
+        return (self.batch.bind("actuator_force") * self.batch.bind("actuator_velocity")).T
 
     def push(self, torques: Sequence[Scalar]) -> Sequence[Scalar]:
         """Set the torques about the axes, one for all or (n_worlds,) each; return arrays (n_worlds,) [N m]."""

@@ -119,6 +119,8 @@ def summary_table(summary: Row) -> Group:
     """Make what `cmg-mj run` prints: the figures of each axis, and those of its open-loop observers."""
     axes = section(summary, AXES) or {"": summary}
     printed = {name: {key: axis[key] for key in PRINTED if key in axis} for name, axis in axes.items()}
+    first = next(iter(printed))
+    printed[first] |= {key: summary[key] for key in PRINTED if key in summary and key not in printed[first]}
     end = outcome_in_words(str(summary["outcome"]), summary["end_time_s"])
     tables, floors = [figures_table(printed, {next(iter(axes)): end}, run_title(summary))], ""
     for name, axis in axes.items():

@@ -56,6 +56,10 @@ KEYS = {
     "command_saturated_fraction": Key("command limited", "", "{:.1%}", compared=False),
     "bias_estimate_deg": Key("bias found", "deg", "{:.4f}", compared=False, positive=False),
     "bias_rms_error_deg": Key("bias RMS error", "deg", "{:.4f}", compared=False),
+    "steps": Key("steps walked", "", "{:.0f}", compared=False, better="more"),
+    "distance_m": Key("distance", "m", "{:.2f}", compared=False, better="more"),
+    "gimbal_energy_j": Key("gimbals' energy a step", "J", "{:.3f}", compared=False),
+    "leg_energy_j": Key("legs' energy a step", "J", "{:.2f}", compared=False),
     "fell_fraction": Key("fell", "", "{:.0%}", better=""),
     "stopped_fraction": Key("stopped", "", "{:.0%}", better=""),
 }

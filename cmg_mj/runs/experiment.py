@@ -273,6 +273,9 @@ class Experiment:
         plants = [plant] if single else list(plant)
         if driver != "native" and not single:
             raise InputError(f"driver = {driver!r}: drives one world, not a batch")
+        for name, make in entries("in_world").items():
+            own, worlds = self.scenario.section(name), np.atleast_1d(controller.world_ids).tolist()
+            plants = [make(own, rig, controller.seed, world) for rig, world in zip(plants, worlds, strict=True)]
         settings, keep = self.scenario.metrics, options.get("keep_trajectory", True)
         outside = outsides(self.scenario) if outside is None else outside
         acting = disturbances(outside, plants, controller.seed, controller.world_ids)
@@ -304,6 +307,8 @@ class Experiment:
             from cmg_mj.runs.callback import CallbackLoop, control_callback  # the loop needs no callback of MuJoCo's
 
             loop, driving = CallbackLoop, control_callback(plants[0], controller)
+        sections = {make: self.scenario.section(name) for name, make in entries("figures").items()}
+        sums = [one for make, own in sections.items() if (one := make(own, plants[0], len(plants), controller.axes[0].law.dt))]
         ticks = loop(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
         rest, on_progress = Outcome("done", duration_s), options.get("on_progress")
         try:
@@ -314,6 +319,8 @@ class Experiment:
                     running = None if physics.running is None else physics.running.copy()
                     for recorder, torque in zip(recorders.values(), tick.torques, strict=True):
                         recorder.add(tick.q, tick.v, torque, running)
+                    for one in sums:
+                        one.add(tick.step * timestep, tick.q, physics.power(), running)
                     if on_progress:
                         on_progress((tick.step + tick.steps) * timestep)
         except RunStopped as error:
@@ -326,6 +333,7 @@ class Experiment:
         outcomes = [outcome_of(endings[world], timestep) if world in endings else rest for world in range(len(plants))]
         summaries = [
             combine_axes({name: one.metrics.summary(world, outcome.kind == "done") for name, one in recorders.items()})
+            | {key: value for one in sums for key, value in one.figures(world).items()}
             for world, outcome in enumerate(outcomes)
         ]
         return Result(

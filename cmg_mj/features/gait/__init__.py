@@ -24,6 +24,7 @@ class Gait(Section):
         width_m: Distance between the lines of both feet, from the first steps on; without it that of the keyframe [m].
         lean_s: Time constant in which the torso is moved until the mass centre stands over the feet, by the equilibrium
             bias that is found; 0: none is looked for [s].
+        tiles_m: Largest height of the floor's tiles, each of which has its own [m].
         switch_force_n: Force from which a foot switch is closed [N].
         switch_delay_s: Delay of the foot switches [s].
         switch_bounce_s: Time for which a foot switch bounces after a change [s].
@@ -37,6 +38,7 @@ class Gait(Section):
     stand_s: Annotated[float, Field(ge=0.5, le=60.0)] = 1.25
     width_m: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
     lean_s: NonNegative = 1.0
+    tiles_m: Annotated[float, Field(ge=0.0, le=0.02)] = 0.0
     switch_force_n: Positive = 5.0
     switch_delay_s: Latency = 0.005
     switch_bounce_s: Latency = 0.005

@@ -49,18 +49,19 @@ class Lean:
         self._before: list[tuple[Scalar, Scalar]] = []
         self._both, self._settled = zero, zero
 
-    def update(self, ticks: Sequence[Tick], line: np.ndarray, both: Scalar) -> None:
+    def update(self, ticks: Sequence[Tick], line: np.ndarray, both: Scalar, planned: bool) -> None:
         """Take the decisions of a tick.
 
         Args:
             ticks: Of each axis, with the command in force.
             line: Components of the feet's line along the axes, (n_axes,).
             both: Whether both feet stand; then the robot tilts about that line alone.
+            planned: Whether both are planned to. While a foot lands early or late, nothing is found.
         """
         if not self._time:
             return
         before, self._before = self._before, [self._expected(*each) for each in zip(self._models, ticks, strict=True)]
-        self._settled = where(both == self._both, self._settled + self._dt, 0.0)
+        self._settled = where((both == self._both) & (both == planned), self._settled + self._dt, 0.0)
         self._both = both
         if not before:
             return

@@ -55,6 +55,7 @@ class Walking:
         self._known = -walk.acceleration @ across.T / plant.gravity
         left, right = walk.feet[:, :, :2]
         self._lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None] @ about.T
+        self._double = (walk.plan.load(walk.time) > 0.0).all(axis=0).astype(float)
         self._leaning = -walk.height * walk.leaning @ across.T
         zero = 0.0 if isinstance(first.world_ids, int) else np.zeros(len(first.world_ids))
         self._lean = Lean(self._models, self._dt, gait.lean_s, walk.height / plant.gravity, zero)
@@ -79,7 +80,7 @@ class Walking:
             caught.append(model.tilt_acceleration(x1, x2, x3, tick.u) + x2 / CAUGHT_S)
         contact = where(both, -dot(across, caught), 0.0)
         before = self._lean.lean.copy()
-        self._lean.update(ticks, line, both)
+        self._lean.update(ticks, line, both, bool(self._at(self._double, time) >= 1.0))
         known = self._at(self._known, time + 0.5 * dt)  # a sample is the mean since the one before
         for i, part in enumerate(controllers):
             part.known_tilt = known[i] + self._lean.known_tilt[i]

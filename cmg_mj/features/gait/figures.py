@@ -1,0 +1,63 @@
+"""Figures of a walk: steps, distance, energy."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from cmg_mj.core.loop import Joints
+from cmg_mj.features.gait import Gait
+from cmg_mj.features.gait.walk import planned
+from cmg_mj.plant.plant import Plant
+from cmg_mj.results.summary_keys import Figures
+
+
+class WalkFigures:
+    """Sums over the ticks of one or many worlds.
+
+    Args:
+        gait: The gait.
+        plant: The robot.
+        n_worlds: Number of worlds.
+        dt: Control period [s].
+    """
+
+    def __init__(self, gait: Gait, plant: Plant, n_worlds: int, dt: float) -> None:
+        walk = planned(plant, gait)
+        self._lands, self._dt = np.array([step.lands for step in walk.plan.steps]), dt
+        joint = int(np.flatnonzero(plant.filed.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])
+        self._place = int(plant.filed.model.jnt_qposadr[joint])
+        self._actuators = {"gimbal": [servo for axis in plant.axes for servo in axis.servos], "leg": list(walk.servos)}
+        self._work = {name: np.zeros(n_worlds) for name in self._actuators}
+        self._end = np.zeros(n_worlds)
+        self._start = self._last = np.zeros((2, n_worlds))
+
+    def add(self, time: float, q: Joints, power: np.ndarray, running: np.ndarray | None) -> None:
+        """Take a tick.
+
+        Args:
+            time: [s].
+            q: Joint positions at it.
+            power: Of each actuator, at its end, (n,) or (n, n_worlds) [W].
+            running: Which worlds have not ended, (n_worlds,); None for one world.
+        """
+        going = np.ones(1, dtype=bool) if running is None else running
+        place = np.reshape([q[self._place], q[self._place + 1]], (2, -1))
+        if time == 0.0:
+            self._start = self._last = place
+        self._last, self._end = np.where(going, place, self._last), np.where(going, time, self._end)
+        for name, actuators in self._actuators.items():
+            used = np.abs(np.reshape(power[actuators], (len(actuators), -1))).sum(axis=0)
+            self._work[name] += np.where(going, used * self._dt, 0.0)
+
+    def figures(self, world: int) -> Figures:
+        """Return the figures of a world; energy a step is None without a step."""
+        steps = float((self._lands <= self._end[world]).sum())
+        way = float(np.hypot(*(self._last - self._start)[:, world]))
+        each = {f"{name}_energy_j": float(work[world]) / steps if steps else None for name, work in self._work.items()}
+        return {"steps": steps, "distance_m": way, **each}
+
+
+def walk_figures(gait: Gait, plant: Plant, n_worlds: int, dt: float) -> WalkFigures | None:
+    """Make the figures of a walk; None without steps."""
+    return WalkFigures(gait, plant, n_worlds, dt) if gait.steps else None
