@@ -77,6 +77,12 @@ FEATURES = {
         disturbance="cmg_mj.features.pivot.moving_pivot:moving_pivot",
         judge="cmg_mj.features.pivot.moving_pivot:describe_pivots",
     ),
+    "track": Feature(
+        section="cmg_mj.features.track:Track",
+        is_list=True,
+        check="cmg_mj.features.track.motion:check_tracks",
+        disturbance="cmg_mj.features.track.motion:track_motion",
+    ),
     "studio": Feature(
         commands={
             "studio": Command(

@@ -308,7 +308,11 @@ class Experiment:
 
             loop, driving = CallbackLoop, control_callback(plants[0], controller)
         sections = {make: self.scenario.section(name) for name, make in entries("figures").items()}
-        sums = [one for make, own in sections.items() if (one := make(own, plants[0], len(plants), controller.axes[0].law.dt))]
+        sums = [
+            one
+            for make, own in sections.items()
+            if (one := make(own, plants[0], len(plants), controller.axes[0].law.dt))
+        ]
         ticks = loop(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
         rest, on_progress = Outcome("done", duration_s), options.get("on_progress")
         try:

@@ -13,7 +13,7 @@ from cmg_mj.core.reduced_model import ReducedModel
 
 SETTLED_S = 0.05
 """Time after a foot lands or lifts in which an impact is no bias [s]."""
-FIRST_S, LAST_S = 0.3, 10.0
+FIRST_S, LAST_S = 2.0, 10.0
 """Times over which what is found is averaged: at the first moment, and at most [s]."""
 MOST = math.radians(3.0)
 """No larger bias is believed [rad]."""
@@ -39,9 +39,7 @@ class Lean:
         known_tilt: Tilt by which accelerometers err while the torso is moved [rad].
     """
 
-    def __init__(
-        self, models: Sequence[ReducedModel], dt: float, time_s: float, fall_s2: float, zero: Scalar
-    ) -> None:
+    def __init__(self, models: Sequence[ReducedModel], dt: float, time_s: float, fall_s2: float, zero: Scalar) -> None:
         self._models, self._dt, self._time, self._fall = models, dt, time_s, fall_s2
         self.bias: list[Scalar] = [zero] * len(models)
         self.lean, self.known_tilt = list(self.bias), list(self.bias)

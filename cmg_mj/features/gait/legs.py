@@ -122,8 +122,18 @@ class _Legs:
         at_rest, small = qpos[:, self.q.ravel()], 1e-4 * np.eye(2)
         leaning = [(self.joints(torso + d, feet)[:, self.q.ravel()] - at_rest) / 1e-4 for d in small]
         return Walk(
-            plan, time, feet, qpos, qvel, torques, point, self.servos, setpoints, np.stack(leaning, axis=-1),
-            float(self.centre[2]), acceleration,
+            plan,
+            time,
+            feet,
+            qpos,
+            qvel,
+            torques,
+            point,
+            self.servos,
+            setpoints,
+            np.stack(leaning, axis=-1),
+            float(self.centre[2]),
+            acceleration,
         )
 
     def joints(self, torso: np.ndarray, feet: np.ndarray) -> np.ndarray:

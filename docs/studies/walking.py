@@ -1,0 +1,106 @@
+"""The tables of docs/walking.md: how many worlds walk 22 steps.
+
+python docs/studies/walking.py [--worlds 20] [ROWS...]
+
+ROWS: names of the groups below; all of them take half an hour on two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmg_mj.runs.experiment import prepare
+from cmg_mj.scenario.loading import load_scenario
+
+NOISE = "sensors.accelerometer.noise_density_ug_rthz="
+QUIET, STOCK = NOISE + "100", NOISE + "400"
+TILES = "gait.tiles_m=0.002"
+PUSHES = [
+    f'push=[{{axis="pitch",start_s=5.0,torque_n_m={(n := 0.5 * 0.342 / 0.1):.3f}}},'
+    f'{{axis="roll",start_s=10.45,torque_n_m={n:.3f}}},{{axis="pitch",start_s=15.2,torque_n_m=-{n:.3f}}}]'
+]
+"""Three of 0.5 N s at the height of the mass centre: on one foot, on one foot, on two."""
+HELD, STOPPED = "controller.rate_limit_rad_s=1e-6", "plant.flywheel_speed_rad_s=0.001"
+
+Rows = Sequence[tuple[str, float, Sequence[str]]]
+GROUPS: dict[str, Rows] = {
+    "claim": [
+        ("gyro_free, 400 ug", 0.0, [STOCK]),
+        ("gyro_free, 400 ug", 0.25, [STOCK]),
+        ("gyro_free, 100 ug", 0.25, [QUIET]),
+        ("gyro_free, 100 ug", 0.5, [QUIET]),
+        ("rate from the truth, 400 ug", 0.0, [STOCK, "controller.feedback=truth"]),
+        ("mems_fused, 400 ug", 0.25, [STOCK, "observer.kind=mems_fused"]),
+        ("gimbals held, wheels turning", 0.25, [QUIET, HELD]),
+        ("wheels stopped", 0.25, [QUIET, STOPPED, "controller.gains=[1,1,1,1]"]),
+    ],
+    "rough": [
+        ("gyro_free, 100 ug, tiles and pushes", 0.25, [QUIET, TILES, *PUSHES]),
+        ("gyro_free, 400 ug, tiles and pushes", 0.0, [STOCK, TILES, *PUSHES]),
+        ("gyro_free, 400 ug, tiles", 0.0, [STOCK, TILES]),
+    ],
+    "observers": [
+        (f"{kind}, 100 ug", 0.1, [QUIET, f"observer.kind={kind}"])
+        for kind in (
+            "homogeneous",
+            "kalman",
+            "luenberger",
+            "free_pivot",
+            "homogeneous_adaptive",
+            "adaptive",
+            "ltv",
+            "linear",
+            "high_gain",
+            "super_twisting",
+        )
+    ],
+    "steps": [
+        (f"{integrator}, {step} s", 0.0, [QUIET, f"plant.integrator={integrator}", f"plant.timestep_s={step}"])
+        for integrator in ("RK4", "implicitfast")
+        for step in (0.0025, 0.001, 0.0005)
+    ],
+}
+
+
+def walk(worlds: int, label: str, e_deg: float, settings: Sequence[str]) -> str:
+    """Run worlds with e uniform in +-e_deg about each axis; return a row of the table."""
+    generator = np.random.default_rng(1)
+    own = {
+        f"axes.{axis}.plant.equilibrium_bias_deg": generator.uniform(-e_deg, e_deg, worlds).tolist()
+        for axis in ("roll", "pitch")
+    }
+    start = [f"axes.{axis}.plant.equilibrium_bias_deg=0.0" for axis in ("roll", "pitch")]
+    result = prepare(load_scenario("walk", [*start, *settings])).run_many(worlds, settings=own, keep_trajectory=False)
+    walked = int((result.stood).sum())
+    figures = [
+        "-" if (mean := result.mean(key)) is None else f"{mean:{digits}}"
+        for key, digits in (
+            ("tilt_rms_deg", ".3f"),
+            ("gimbal_peak_deg", ".0f"),
+            ("velocity_rms_error_rad_s", ".4f"),
+            ("gimbal_energy_j", ".3f"),
+            ("leg_energy_j", ".2f"),
+        )
+    ]
+    falls = sorted(outcome.time_s for outcome in result.outcomes if outcome.kind != "done")
+    when = f"{falls[0]:.1f} to {falls[-1]:.1f} s" if falls else ""
+    return " | ".join([f"| {label}", f"{e_deg:g}", f"{walked}/{worlds}", when, *figures]) + " |"
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", nargs="*", metavar="ROWS", choices=[[], *GROUPS], help=", ".join(GROUPS))
+    parser.add_argument("--worlds", type=int, default=20)
+    arguments = parser.parse_args()
+    for name in arguments.rows or GROUPS:
+        print(f"\n{name}\n| | e | walked | falls at | tilt RMS | gimbal peak | rate error | gimbals J | legs J |")
+        for label, e_deg, settings in GROUPS[name]:
+            print(walk(arguments.worlds, label, e_deg, settings), flush=True)
+
+
+if __name__ == "__main__":
+    main()
