@@ -20,7 +20,8 @@ TORQUES = {"push": Pushes, "swing": Swings}
 def outsides(scenario: Scenario) -> Outsides:
     """Take what acts from outside from a scenario."""
     torques = {name: tuple(scenario.section(name)) for name in TORQUES}
-    return torques | {name: tuple(scenario.feature_sections[name]) for name in entries("disturbance")}
+    features = {**entries("disturbance"), **entries("between")}
+    return torques | {name: tuple(scenario.feature_sections[name]) for name in features}
 
 
 def disturbances(

@@ -8,21 +8,34 @@ ROWS: names of the groups below; all of them take half an hour on two cores.
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from cmg_mj.inputs.files import folder
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 
 NOISE = "sensors.accelerometer.noise_density_ug_rthz="
 QUIET, STOCK = NOISE + "100", NOISE + "400"
 TILES = "gait.tiles_m=0.002"
-PUSHES = [
-    f'push=[{{axis="pitch",start_s=5.0,torque_n_m={(n := 0.5 * 0.342 / 0.1):.3f}}},'
-    f'{{axis="roll",start_s=10.45,torque_n_m={n:.3f}}},{{axis="pitch",start_s=15.2,torque_n_m=-{n:.3f}}}]'
-]
-"""Three of 0.5 N s at the height of the mass centre: on one foot, on one foot, on two."""
+HEIGHT_M = 0.342
+"""Of the mass centre, at which pushes act [m]."""
+
+
+def push(size: float, *starts: float) -> str:
+    """Set pushes of a size [N s] for 0.1 s, about pitch and roll in turn."""
+    torque = size * HEIGHT_M / 0.1
+    each = [
+        f'{{axis="{("pitch", "roll")[i % 2]}",start_s={start},torque_n_m={torque}}}' for i, start in enumerate(starts)
+    ]
+    return f"push=[{','.join(each)}]"
+
+
+PUSHES = [push(0.5, 4.9, 10.4, 15.1)]
+"""On one foot, on two, on one."""
 HELD, STOPPED = "controller.rate_limit_rad_s=1e-6", "plant.flywheel_speed_rad_s=0.001"
 
 Rows = Sequence[tuple[str, float, Sequence[str]]]
@@ -57,6 +70,26 @@ GROUPS: dict[str, Rows] = {
             "super_twisting",
         )
     ],
+    "limits": [
+        *(
+            (f"push of {size} N s on {feet}", 0.0, [QUIET, push(size, at)])
+            for feet, at in (("one foot", 10.45), ("two feet", 10.2))
+            for size in (0.8, 1.0, 1.2, 1.4, 1.7)
+        ),
+        *((f"wheels at {w} rad/s", 0.0, [QUIET, f"plant.flywheel_speed_rad_s={w}"]) for w in (160, 80, 40, 20)),
+        ("e of 1 deg about pitch", 0.0, [QUIET, "axes.pitch.plant.equilibrium_bias_deg=1.0"]),
+        ("e of 1 deg about roll", 0.0, [QUIET, "axes.roll.plant.equilibrium_bias_deg=1.0"]),
+        *((f"tiles to {mm} mm", 0.0, [QUIET, f"gait.tiles_m={mm / 1e3}"]) for mm in (1, 3, 4)),
+        ("10 mg of vibration", 0.0, [QUIET, "sensors.accelerometer.vibration_mg=10"]),
+        ("3 mg of vibration", 0.0, [QUIET, "sensors.accelerometer.vibration_mg=3"]),
+        *((f"{s} s a step", 0.0, [QUIET, f"gait.single_s={s / 2}", f"gait.double_s={s / 2}"]) for s in (0.8, 0.7, 0.6)),
+        ("15 cm a step", 0.0, [QUIET, "gait.step_length_m=0.15"]),
+        ("20 cm a step", 0.0, [QUIET, "gait.step_length_m=0.2"]),
+        ("feet 80 mm apart", 0.0, [QUIET, "gait.width_m=0.08"]),
+        ("no bias looked for, e to 0.25", 0.25, [QUIET, "gait.lean_s=0"]),
+        ("hips of 2000 N m/rad", 0.0, [QUIET, "plant.model=SOFT"]),
+        ("hips of 2000 N m/rad, homogeneous", 0.0, [QUIET, "plant.model=SOFT", "observer.kind=homogeneous"]),
+    ],
     "steps": [
         (f"{integrator}, {step} s", 0.0, [QUIET, f"plant.integrator={integrator}", f"plant.timestep_s={step}"])
         for integrator in ("RK4", "implicitfast")
@@ -72,7 +105,17 @@ def walk(worlds: int, label: str, e_deg: float, settings: Sequence[str]) -> str:
         f"axes.{axis}.plant.equilibrium_bias_deg": generator.uniform(-e_deg, e_deg, worlds).tolist()
         for axis in ("roll", "pitch")
     }
+    if "plant.model=SOFT" in settings:
+        soft = Path(tempfile.mkdtemp()) / "soft.xml"
+        text = (
+            (folder("models") / "biped.xml")
+            .read_text(encoding="utf-8")
+            .replace('kp="8000" kv="40"', 'kp="2000" kv="20"')
+        )
+        soft.write_text(text.replace('"cube.xml"', f'"{folder("models") / "cube.xml"}"'), encoding="utf-8")
+        settings = [setting.replace("SOFT", str(soft)) for setting in settings]
     start = [f"axes.{axis}.plant.equilibrium_bias_deg=0.0" for axis in ("roll", "pitch")]
+    own = own if e_deg else None
     result = prepare(load_scenario("walk", [*start, *settings])).run_many(worlds, settings=own, keep_trajectory=False)
     walked = int((result.stood).sum())
     figures = [
