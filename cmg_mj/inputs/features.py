@@ -66,6 +66,7 @@ FEATURES = {
     "gait": Feature(
         section="cmg_mj.features.gait:Gait",
         edit="cmg_mj.features.gait.tiles:lay_tiles",
+        check="cmg_mj.features.gait.walk:check_gait",
         in_world="cmg_mj.features.gait.tiles:with_heights",
         between="cmg_mj.features.gait.walk:walking",
         figures="cmg_mj.features.gait.figures:walk_figures",

@@ -73,7 +73,7 @@ GROUPS: dict[str, Rows] = {
     "limits": [
         *(
             (f"push of {size} N s on {feet}", 0.0, [QUIET, push(size, at)])
-            for feet, at in (("one foot", 10.45), ("two feet", 10.2))
+            for feet, at in (("one foot", 9.9), ("two feet", 10.4))
             for size in (0.8, 1.0, 1.2, 1.4, 1.7)
         ),
         *((f"wheels at {w} rad/s", 0.0, [QUIET, f"plant.flywheel_speed_rad_s={w}"]) for w in (160, 80, 40, 20)),

@@ -15,6 +15,7 @@ from cmg_mj.features.gait.lean import Lean
 from cmg_mj.features.gait.legs import Walk, plan_walk
 from cmg_mj.features.gait.switches import FootSwitches
 from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.schema import Scenario
 
 PLAN_S = 0.005
 """Time between two points of a plan [s]."""
@@ -28,6 +29,17 @@ CAUGHT_S = 0.02
 def planned(plant: Plant, gait: Gait) -> Walk:
     """Plan a walk for a plant as its file has it: no equilibrium bias is known."""
     return plan_walk(plant.filed.model, plant.key, gait, PLAN_S)
+
+
+def check_gait(scenario: Scenario, plant: Plant) -> None:
+    """Refuse a gait that the plant cannot walk.
+
+    Raises:
+        InputError: The plant is no such robot, or its legs do not reach so far.
+    """
+    gait: Gait = scenario.section("gait")
+    if gait.steps:
+        planned(plant, gait)
 
 
 def walking(gait: Gait, plant: Plant) -> Callable[[Controller], Walking] | None:

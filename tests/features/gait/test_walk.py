@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.features.gait import walk as stage
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
@@ -12,30 +17,125 @@ from tests.command import cmg_mj
 
 QUIET = "sensors.accelerometer.noise_density_ug_rthz=100"
 HELD = "controller.rate_limit_rad_s=1e-6"
+SHORT = "gait.steps=2", "duration_s=5.0"
+LONG = pytest.mark.slow
+E_DEG = [f"axes.{axis}.plant.equilibrium_bias_deg" for axis in ("roll", "pitch")]
 
 
-def walked(worlds: int, *settings: str) -> Result:
-    return prepare(load_scenario("walk", settings)).run_many(worlds, keep_trajectory=False)
+def walked(worlds: int, *settings: str, e_deg: float = 0.0, **options: bool) -> Result:
+    """Run worlds with e uniform about both axes."""
+    generator = np.random.default_rng(1)
+    own = {field: generator.uniform(-e_deg, e_deg, worlds).tolist() for field in E_DEG} if e_deg else None
+    experiment = prepare(load_scenario("walk", [*(f"{field}=0.0" for field in E_DEG), *settings]))
+    return experiment.run_many(worlds, settings=own, **{"keep_trajectory": False, **options})
 
 
-def fallen(result: Result) -> int:
-    return sum(outcome.kind == "fell" for outcome in result.outcomes)
+def stood(result: Result) -> int:
+    return int(result.stood.sum())
 
 
 def test_it_takes_two_steps_and_stands() -> None:
-    result = walked(2, QUIET, "gait.steps=2", "duration_s=5.0")
-    assert fallen(result) == 0
-    assert (result.mean("tilt_rms_deg") or 9.0) < 0.4
+    result = walked(2, QUIET, *SHORT)
+    assert stood(result) == 2
+    assert (result.mean("tilt_rms_deg") or 9.0) < 0.2
+    assert [result.mean("steps"), round(result.mean("distance_m") or 0.0, 2)] == [2.0, 0.1]  # the second one closes up
 
 
-def test_with_its_gimbals_held_it_falls() -> None:
-    assert fallen(walked(2, QUIET, HELD, "gait.steps=2", "duration_s=5.0")) == 2
+def test_with_its_gimbals_held_it_falls_at_the_first_step() -> None:
+    result = walked(2, QUIET, HELD, *SHORT)
+    assert stood(result) == 0
+    assert all(1.75 < outcome.time_s < 3.5 for outcome in result.outcomes)
 
 
-@pytest.mark.slow
-def test_it_walks_22_steps_and_none_with_held_gimbals() -> None:
-    assert fallen(walked(8, QUIET)) == 0
-    assert fallen(walked(8, QUIET, HELD)) == 8
+@LONG
+@pytest.mark.parametrize(
+    ("settings", "e_deg", "least"),
+    [
+        ([], 0.0, 20),
+        ([QUIET], 0.25, 19),
+        ([QUIET, "gait.tiles_m=0.002"], 0.25, 18),
+        ([QUIET, "observer.kind=homogeneous"], 0.1, 18),
+        ([QUIET, "gait.step_length_m=0.0"], 0.0, 20),
+        ([QUIET, "gait.step_length_m=0.15", "gait.single_s=0.7"], 0.0, 20),
+    ],
+)
+def test_of_20_worlds_walk(settings: list[str], e_deg: float, least: int) -> None:
+    assert stood(walked(20, *settings, e_deg=e_deg)) >= least
+
+
+@LONG
+@pytest.mark.parametrize("still", [[HELD], ["plant.flywheel_speed_rad_s=0.001", "controller.gains=[1,1,1,1]"]])
+def test_without_gyros_none_of_20_walks(still: list[str]) -> None:
+    assert stood(walked(20, QUIET, *still)) == 0
+
+
+@LONG
+@pytest.mark.parametrize(("share", "steps"), [(0.8, 22.0), (1.1, 22.0), (0.0, 3.0)])
+def test_the_planned_acceleration_is_needed_and_need_not_be_exact(
+    monkeypatch: pytest.MonkeyPatch, share: float, steps: float
+) -> None:
+    """With 80 to 110 % of it taken off the tilt, all steps are walked; with none, it falls before the third."""
+    planned = stage.planned
+
+    def wrong(*arguments: object) -> object:
+        plan = planned(*arguments)  # type: ignore[arg-type]
+        return dataclasses.replace(plan, acceleration=share * plan.acceleration)
+
+    monkeypatch.setattr(stage, "planned", wrong)
+    taken = [float(summary["steps"]) for summary in walked(4, QUIET).summaries]  # type: ignore[arg-type]
+    assert max(taken) < steps if share == 0.0 else min(taken) == steps
+
+
+@LONG
+def test_figures_do_not_depend_on_the_step() -> None:
+    coarse, fine = (walked(8, QUIET, f"plant.timestep_s={step}") for step in (0.0025, 0.001))
+    for key in ("tilt_rms_deg", "gimbal_peak_deg", "velocity_rms_error_rad_s", "leg_energy_j"):
+        assert coarse.mean(key) == pytest.approx(fine.mean(key), rel=0.1)
+
+
+@LONG
+@pytest.mark.parametrize(("roll", "pitch"), [(0.4, -0.4), (-0.4, 0.4)])
+def test_the_equilibrium_bias_is_found(monkeypatch: pytest.MonkeyPatch, roll: float, pitch: float) -> None:
+    """Within 0.1 deg, and the torso is moved by all of it."""
+    made: list[stage.Walking] = []
+    start = stage.Walking.__init__
+
+    def remembered(self: stage.Walking, *arguments: object) -> None:
+        start(self, *arguments)  # type: ignore[arg-type]
+        made.append(self)
+
+    monkeypatch.setattr(stage.Walking, "__init__", remembered)
+    walked(4, QUIET, *(f"{field}={e}" for field, e in zip(E_DEG, (roll, pitch), strict=True)))
+    lean = made[-1]._lean
+    np.testing.assert_allclose(np.degrees(np.mean(lean.bias, axis=1)), [roll, pitch], atol=0.1)
+    np.testing.assert_allclose(np.degrees(np.mean(lean.lean, axis=1)), [roll, pitch], atol=0.1)
+
+
+def test_tiles_differ_from_world_to_world_and_not_from_run_to_run() -> None:
+    height = [
+        walked(2, QUIET, *SHORT, "gait.tiles_m=0.004", keep_trajectory=True).trajectory["position/torso/z_m"][-1]  # type: ignore[index]
+        for _ in range(2)
+    ]
+    np.testing.assert_array_equal(*height)
+    assert abs(height[0][0] - height[0][1]) > 1e-4
+
+
+def test_a_world_is_the_same_alone_by_callback_and_among_others() -> None:
+    settings = [QUIET, *SHORT, "gait.tiles_m=0.001", "plant.equilibrium_bias_deg=0.2"]
+    experiment = prepare(load_scenario("walk", settings))
+    alone, called = experiment.run(world=1).trajectory, experiment.run(world=1, driver="callback").trajectory
+    many = experiment.run_many([0, 1]).trajectory
+    assert alone is not None
+    assert called is not None
+    assert many is not None
+    for name in ("roll/x1_rad", "pitch/u_rad_s", "position/torso/x_m"):
+        np.testing.assert_array_equal(alone[name], many[name][:, 1])
+        np.testing.assert_array_equal(alone[name], called[name])
+
+
+def test_what_the_legs_do_not_reach_is_refused() -> None:
+    with pytest.raises(InputError, match=r"gait: the plan takes left/hip_pitch to .*its range is .*shorter steps"):
+        walked(1, "gait.step_length_m=0.5")
 
 
 def test_means_need_the_models_sensors() -> None:
@@ -43,7 +143,11 @@ def test_means_need_the_models_sensors() -> None:
         prepare(load_scenario("push_recovery", ["sensors.accelerometer.averaged=true"]))
 
 
-def test_a_plugin_has_no_legs(elsewhere: None) -> None:
-    assert (
-        "a plugin does not have it" in cmg_mj("plugin", "gyro_free", "--scenario", "walk", "--out", "there").complaint
-    )
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [(["plugin", "gyro_free"], "a plugin does not have it"), (["export", "gyro_free"], "two axes|several axes|axes")],
+)
+def test_no_plugin_and_no_c_have_legs(elsewhere: None, command: list[str], complaint: str) -> None:
+    said = cmg_mj(*command, "--scenario", "walk", "--out", "there").complaint
+    assert any(part in said for part in complaint.split("|"))
+    assert not Path("there").exists()
