@@ -107,14 +107,16 @@ class _Legs:
         pole = math.sqrt(float(np.linalg.norm(self.model.opt.gravity)) / self.centre[2])
         planned, shares = plan.feet(time), plan.load(time)
         torso, feet = plan.mass_centre(time, pole), planned
+        qpos = self.joints(torso, feet)
         for _ in range(PASSES):
-            qpos = self.joints(torso, feet)
             feet = planned + plan.rolled(time, self.ways(qpos))
             qpos = self.joints(torso, feet)
-            qvel, acceleration, forces, point = self.dynamics(qpos, dt)
+            *_, point = self.dynamics(qpos, dt)
             error = np.einsum("fn,fni->ni", shares, feet[:, :, :2]) - point
             error[[0, -1]] = 0.0
             torso = torso + bounded(error, pole, dt)
+            qpos = self.joints(torso, feet)
+        qvel, acceleration, forces, point = self.dynamics(qpos, dt)
         torques = self.loads(qpos, forces, shares)
         gain, damping = self.model.actuator_gainprm[self.servos, 0], -self.model.actuator_biasprm[self.servos, 2]
         self._check_reach(time, qpos)

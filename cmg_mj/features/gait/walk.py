@@ -80,8 +80,8 @@ class Walking:
         line = self._at(self._lines, time)
         across = np.array([-line[1], line[0]])
         ticks = [part.tick for part in controllers if part.tick is not None]
-        held = dot(line, [tick.u for tick in ticks])
-        back = -dot(across, [tick.y2 for tick in ticks]) / RECENTRED_S
+        held = dot(line.tolist(), [tick.u for tick in ticks])
+        back = -dot(across.tolist(), [tick.y2 for tick in ticks]) / RECENTRED_S
         for i, part in enumerate(controllers):
             limit = part.law.rate_limit
             u = clip(where(both, line[i] * held + across[i] * back, ticks[i].u), -limit, limit)
@@ -90,7 +90,7 @@ class Walking:
         for model, tick in zip(self._models, ticks, strict=True):
             x1, x2, x3 = tick.estimates[0][:3]
             caught.append(model.tilt_acceleration(x1, x2, x3, tick.u) + x2 / CAUGHT_S)
-        contact = where(both, -dot(across, caught), 0.0)
+        contact = where(both, -dot(across.tolist(), caught), 0.0)
         before = self._lean.lean.copy()
         self._lean.update(ticks, line, both, bool(self._at(self._double, time) >= 1.0))
         known = self._at(self._known, time + 0.5 * dt)  # a sample is the mean since the one before
@@ -99,7 +99,7 @@ class Walking:
             part.bias = self._lean.bias[i] - self._lean.lean[i]
             part.contact = across[i] * contact
             part.command_rate(ticks[i].u)
-        return self._walk.servos, self._legs(time, before, self._lean.lean)
+        return self._walk.servos.tolist(), self._legs(time, before, self._lean.lean)
 
     def _legs(self, time: float, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
         """Return the rates at which the servos' setpoints run until the next tick, (6,) or (6, n_worlds)."""

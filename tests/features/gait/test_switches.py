@@ -13,7 +13,7 @@ from cmg_mj.features.gait.switches import FootSwitches
 DT = 0.005
 
 
-def said(force: np.ndarray, **settings: float) -> np.ndarray:
+def said(force: np.ndarray, **settings: Any) -> np.ndarray:
     """Return what the switch of the left foot says of forces, tick by tick; the right one stands."""
     first: Any = SimpleNamespace(law=SimpleNamespace(dt=DT), seed=3, world_ids=0)
     switches = FootSwitches(Gait(**settings), first)

@@ -22,12 +22,12 @@ LONG = pytest.mark.slow
 E_DEG = [f"axes.{axis}.plant.equilibrium_bias_deg" for axis in ("roll", "pitch")]
 
 
-def walked(worlds: int, *settings: str, e_deg: float = 0.0, **options: bool) -> Result:
+def walked(worlds: int, *settings: str, e_deg: float = 0.0, keep_trajectory: bool = False) -> Result:
     """Run worlds with e uniform about both axes."""
     generator = np.random.default_rng(1)
     own = {field: generator.uniform(-e_deg, e_deg, worlds).tolist() for field in E_DEG} if e_deg else None
     experiment = prepare(load_scenario("walk", [*(f"{field}=0.0" for field in E_DEG), *settings]))
-    return experiment.run_many(worlds, settings=own, **{"keep_trajectory": False, **options})
+    return experiment.run_many(worlds, settings=own, keep_trajectory=keep_trajectory)
 
 
 def stood(result: Result) -> int:
