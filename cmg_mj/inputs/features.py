@@ -47,6 +47,8 @@ class Feature(NamedTuple):
     """Makes the plant of a world: (section, plant, seed, world) -> plant."""
     figures: str = ""
     """Makes what sums up figures of a run: (section, plant, worlds, control period) -> sums with `add`, `figures`."""
+    series: str = ""
+    """Makes lines of a recording: (section, plant) -> (axis, trajectory) -> {folder/name: values}, or None."""
     judge: str = ""
     """Says what `cmg-mj check` prints of it: (design, plant) -> Judgement."""
     commands: Mapping[str, Command] = {}
@@ -70,6 +72,7 @@ FEATURES = {
         in_world="cmg_mj.features.gait.tiles:with_heights",
         between="cmg_mj.features.gait.walk:walking",
         figures="cmg_mj.features.gait.figures:walk_figures",
+        series="cmg_mj.features.gait.figures:walk_series",
     ),
     "pivot": Feature(
         section="cmg_mj.features.pivot:Pivot",

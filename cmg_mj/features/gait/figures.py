@@ -1,15 +1,20 @@
-"""Figures of a walk: steps, distance, energy."""
+"""Figures of a walk: steps, distance, energy; and the plan beside what came of it."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 
 from cmg_mj.core.loop import Joints
 from cmg_mj.features.gait import Gait
+from cmg_mj.features.gait.legs import SIDES
 from cmg_mj.features.gait.walk import planned
+from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.summary_keys import Figures
+from cmg_mj.results.trajectory import Trajectory
 
 
 class WalkFigures:
@@ -25,8 +30,7 @@ class WalkFigures:
     def __init__(self, gait: Gait, plant: Plant, n_worlds: int, dt: float) -> None:
         walk = planned(plant, gait)
         self._lands, self._dt = np.array([step.lands for step in walk.plan.steps]), dt
-        joint = int(np.flatnonzero(plant.filed.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])
-        self._place = int(plant.filed.model.jnt_qposadr[joint])
+        self._place = int(plant.filed.model.jnt_qposadr[_free_joint(plant)])
         self._actuators = {"gimbal": [servo for axis in plant.axes for servo in axis.servos], "leg": list(walk.servos)}
         self._work = {name: np.zeros(n_worlds) for name in self._actuators}
         self._end = np.zeros(n_worlds)
@@ -61,3 +65,31 @@ class WalkFigures:
 def walk_figures(gait: Gait, plant: Plant, n_worlds: int, dt: float) -> WalkFigures | None:
     """Make the figures of a walk; None without steps."""
     return WalkFigures(gait, plant, n_worlds, dt) if gait.steps else None
+
+
+def walk_series(gait: Gait, plant: Plant) -> Callable[[Axis, Trajectory], dict[str, np.ndarray]] | None:
+    """Make the plan's lines of a recording; None without steps.
+
+    Returns:
+        Function of an axis and a trajectory: places across the axis [m] and shares of the weight, (n_ticks,) each.
+    """
+    if not gait.steps:
+        return None
+    walk, name = planned(plant, gait), plant.filed.model.joint(_free_joint(plant)).name
+    loads = walk.plan.load(walk.time)
+
+    def series(axis: Axis, trajectory: Trajectory) -> dict[str, np.ndarray]:
+        time, across = trajectory["time_s"], np.cross(axis.direction, axis.up)[:2]
+        start = plant.filed.model.key_qpos[plant.key][:2] @ across
+        true = np.stack([trajectory[f"position/{name}/{i}_m"] for i in "xy"], axis=-1) @ across - start
+        places = {"torso planned": walk.qpos[:, :2] @ across - start}
+        places |= {f"{side} foot planned": feet[:, :2] @ across for side, feet in zip(SIDES, walk.feet, strict=True)}
+        lines = {f"place/{what}": values for what, values in places.items()}
+        lines |= {f"support/{side}": load for side, load in zip(SIDES, loads, strict=True)}
+        return {"place/torso": true} | {what: np.interp(time, walk.time, values) for what, values in lines.items()}
+
+    return series
+
+
+def _free_joint(plant: Plant) -> int:
+    return int(np.flatnonzero(plant.filed.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])

@@ -45,7 +45,10 @@ ACTUATOR_PLOTS = (
     Plot("Gimbal angles from upright [deg]", ("gimbal/",), 2.4),
     Plot("Flywheel speeds [rad/s]", ("flywheel/",), 1.8),
     Plot("Integrator [rad s]", ("integrator/",), 1.8),
+    Plot("Places across the axis [m]", ("place/",), 2.4),
+    Plot("Planned shares of the weight", ("support/",), 1.3),
 )
+"""The last two are those of a walk."""
 COMPARED_TILT_PLOTS = (
     Plot("Tilt, true [deg]", ("tilt/true",)),
     Plot("Estimation error of the tilt rate [rad/s]", ("rate_error/",)),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 
+from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.result import Outcome
 from cmg_mj.results.summary_keys import section
@@ -42,6 +43,7 @@ class RecordingHeader:
         swings: Sinusoidal torques from outside, the same in all runs.
         settings: The settle band.
         scenario_toml: The resolved scenario.
+        lines: Functions of an axis and a trajectory that make more lines, as [gait] does.
     """
 
     plant: Plant
@@ -51,6 +53,7 @@ class RecordingHeader:
     swings: Sequence[Swing] = ()
     settings: MetricsSettings = field(default_factory=MetricsSettings)
     scenario_toml: str = ""
+    lines: Sequence[Callable[[Axis, Trajectory], Mapping[str, np.ndarray]]] = ()
 
 
 @dataclass(frozen=True)

@@ -161,6 +161,11 @@ def _series(run: Run, plant: Plant, observers: Sequence[LegendEntry], header: Re
         yield Series(f"gimbal/{part}", module.name, time, np.degrees(angle), color)
         yield Series(f"flywheel/{part}", module.name + suffix, time, speed, color, width)
     yield Series("integrator/x_e", "x_e", time, t["x_e_rad_times_s"], CONTROLLER)
+    for make in header.lines:
+        for i, (path, values) in enumerate(make(plant.axis, t).items()):
+            folder, _, name = path.partition("/")
+            color = MODULES[i % len(MODULES)]
+            yield Series(f"{folder}/{rr.escape_entity_path_part(name)}", name, time, values, color)
 
 
 def _estimates(run: Run, observer: LegendEntry) -> Iterator[Series]:
