@@ -220,7 +220,7 @@ def test_allan_deviation_of_the_drift_is_the_bias_instability() -> None:
 
 def test_every_sensor_of_every_axis_has_a_stream_of_its_own() -> None:
     numbers = [stream.on_axis(axis) for axis in range(3) for stream in NoiseStream]
-    assert sorted(numbers)[: len(NoiseStream)] == list(range(10))
+    assert sorted(numbers)[: len(NoiseStream)] == list(range(12))
     assert len(set(numbers)) == len(numbers)
 
 
