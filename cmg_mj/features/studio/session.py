@@ -14,6 +14,7 @@ import numpy as np
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import Outside
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
+from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.inputs.types import MAX_TIME_S
 from cmg_mj.plant.mjcf import set_control_callback
@@ -120,7 +121,9 @@ class StudioSession:
 
     def __init__(self, experiment: Experiment) -> None:
         self.base = self.now = experiment
-        self.plant = drawn_plant(experiment.plant)
+        self.plant, scenario = drawn_plant(experiment.plant), experiment.scenario
+        for name, make in entries("in_world").items():
+            self.plant = make(scenario.section(name), self.plant, scenario.seed, 0)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
         self._nothing = Outside([0.0] * len(self._lines))
