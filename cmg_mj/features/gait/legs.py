@@ -83,10 +83,16 @@ class _Legs:
         servos = [element_id(model, "actuator", name) for name in names]
         feet = [element_id(model, "site", f"{side}/foot") for side in SIDES]
         root = int(model.body_rootid[model.site_bodyid[feet[0]]]) if min(feet) >= 0 else -1
-        if min(*joints, *servos, root) < 0 or model.jnt_type[model.body_jntadr[root]] != mujoco.mjtJoint.mjJNT_FREE:
+        touch = [element_id(model, "sensor", f"{side}/foot") for side in SIDES]
+        if (
+            min(*joints, *servos, *touch, root) < 0
+            or model.jnt_type[model.body_jntadr[root]] != mujoco.mjtJoint.mjJNT_FREE
+            or (model.actuator_dyntype[servos] != mujoco.mjtDyn.mjDYN_INTEGRATOR).any()
+            or (model.sensor_type[touch] != mujoco.mjtSensor.mjSENS_TOUCH).any()
+        ):
             raise InputError(
-                f"gait.steps: takes a free robot with sites LEG/foot, and joints and actuators "
-                f"LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
+                "gait.steps: takes a free robot with sites and <touch> sensors LEG/foot, and joints and <intvelocity> "
+                f"actuators LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
             )
         self.named = joints
         self.model, self.key, self.feet, self.servos = model, key, feet, np.array(servos)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cache
 
+import mujoco
 import numpy as np
 
 from cmg_mj.core.arrays import clip, dot, where
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import MultiAxisReading, Setpoints
 from cmg_mj.features.gait import Gait
 from cmg_mj.features.gait.lean import Lean
-from cmg_mj.features.gait.legs import Walk, plan_walk
+from cmg_mj.features.gait.legs import SIDES, Walk, plan_walk
 from cmg_mj.features.gait.switches import FootSwitches
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.schema import Scenario
@@ -38,8 +40,11 @@ def check_gait(scenario: Scenario, plant: Plant) -> None:
         InputError: The plant is no such robot, or its legs do not reach so far.
     """
     gait: Gait = scenario.section("gait")
-    if gait.steps:
-        planned(plant, gait)
+    if not gait.steps:
+        return
+    planned(plant, gait)
+    if len(plant.axes) != 2:
+        raise InputError(f"gait.steps = {gait.steps}: takes a robot that tilts about two axes; leave locked_axes out")
 
 
 def walking(gait: Gait, plant: Plant) -> Callable[[Controller], Walking] | None:
@@ -61,6 +66,9 @@ class Walking:
     def __init__(self, walk: Walk, gait: Gait, plant: Plant, first: Controller) -> None:
         self._walk, self._dt = walk, first.law.dt
         self._switches = FootSwitches(gait, first)
+        model = plant.filed.model
+        sensors = [model.sensor(i).name for i in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)]
+        self._feet = [sensors.index(f"{side}/foot") for side in SIDES]
         self._models = [axis.reduced for axis in plant.axes]
         about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
         across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
@@ -75,7 +83,7 @@ class Walking:
     def __call__(self, controllers: Sequence[Controller], ideals: MultiAxisReading) -> Setpoints:
         """Turn the gimbals, move the legs, and tell the controllers what they will know at the next tick."""
         dt, time = self._dt, (controllers[0].step or 0) * controllers[0].timestep
-        left, right = self._switches(ideals.touch)
+        left, right = self._switches([ideals.touch[i] for i in self._feet])
         both = left & right
         line = self._at(self._lines, time)
         across = np.array([-line[1], line[0]])

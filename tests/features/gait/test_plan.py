@@ -82,5 +82,5 @@ def test_one_foot_carries_all_or_both_share(walk: Walk) -> None:
 
 def test_a_robot_without_legs_is_refused() -> None:
     plant = load_plant()
-    with pytest.raises(InputError, match=r"gait\.steps: takes a free robot with sites LEG/foot"):
+    with pytest.raises(InputError, match=r"gait\.steps: takes a free robot with sites and <touch> sensors LEG/foot"):
         plan_walk(plant.model, plant.key, GAIT, DT)
