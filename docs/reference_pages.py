@@ -26,6 +26,7 @@ from cmg_mj.features.bend import Bend
 from cmg_mj.features.export.constants import attribute_descriptions
 from cmg_mj.features.gait import Gait
 from cmg_mj.features.pivot import FIELDS_OF, Pivot
+from cmg_mj.features.track import Track
 from cmg_mj.inputs.files import bundled, folder
 from cmg_mj.inputs.messages import fields_of
 from cmg_mj.inputs.types import OnAllAxes, OnGrid, PerAxis, marked_fields
@@ -120,6 +121,14 @@ EXAMPLES = {
     "gait.double_s": "0.3",
     "gait.lift_m": "0.03",
     "gait.stand_s": "2.0",
+    "gait.width_m": "0.08",
+    "gait.lean_s": "0.5",
+    "gait.tiles_m": "0.002",
+    "gait.switch_force_n": "10.0",
+    "gait.switch_delay_s": "0.01",
+    "gait.switch_bounce_s": "0.01",
+    "track.file": '"nod.csv"',
+    "track.start_s": "1.0",
     "bend.frequency_hz": "25.0",
     "bend.damping_ratio": "0.02",
     "bend.share": "0.3",
@@ -343,6 +352,7 @@ OWN_TABLES = (
     "sensors",
     "axes",
     "push",
+    "track",
     "swing",
     "pivot",
     "metrics",
@@ -411,6 +421,7 @@ def scenario_sections() -> dict[str, type]:
         "controller.lqr": LqrSettings,
         "observer": type(Scenario().observer),
         "push": Push,
+        "track": Track,
         "metrics": MetricsSettings,
         "compare": CompareSettings,
     }

@@ -71,6 +71,7 @@ FEATURES = {
         check="cmg_mj.features.gait.walk:check_gait",
         in_world="cmg_mj.features.gait.tiles:with_heights",
         between="cmg_mj.features.gait.walk:walking",
+        judge="cmg_mj.features.gait.walk:describe_gait",
         figures="cmg_mj.features.gait.figures:walk_figures",
         series="cmg_mj.features.gait.figures:walk_series",
     ),

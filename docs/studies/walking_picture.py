@@ -67,7 +67,7 @@ def main() -> None:
     folder, frames, scene = Path(sys.argv[1]), [], None
     runs = {}
     for label, settings in SIDES.items():
-        experiment = prepare(load_scenario("walk", [f"duration_s={SHOWN_S[1]}", *settings]))
+        experiment = prepare(load_scenario("walk", [f"duration_s={SHOWN_S[1]}", "gait.steps=5", *settings]))
         runs[label] = experiment.run().trajectory
         scene = scene or Scene(experiment.plant)
     assert scene is not None

@@ -16,6 +16,9 @@ from cmg_mj.plant.plant import Plant
 from cmg_mj.results.summary_keys import Figures
 from cmg_mj.results.trajectory import Trajectory
 
+STOOD_S = 0.5
+"""A step counts if the robot has not fallen so long after it was to land [s]."""
+
 
 class WalkFigures:
     """Sums over the ticks of one or many worlds.
@@ -56,7 +59,7 @@ class WalkFigures:
 
     def figures(self, world: int) -> Figures:
         """Return the figures of a world; energy a step is None without a step."""
-        steps = float((self._lands <= self._end[world]).sum())
+        steps = float((self._lands + STOOD_S <= self._end[world]).sum())
         way = float(np.hypot(*(self._last - self._start)[:, world]))
         each = {f"{name}_energy_j": float(work[world]) / steps if steps else None for name, work in self._work.items()}
         return {"steps": steps, "distance_m": way, **each}

@@ -59,7 +59,7 @@ def plan_walk(model: mujoco.MjModel, key: int, gait: Gait, dt: float) -> Walk:
 
     The torso stays level and at its height. Its way is that of the mass centre of the linear inverted pendulum,
     corrected until the zero moment point of the whole robot is the planned one. The feet are balls that roll without
-    slip on the floor, as high as their sites at the keyframe.
+    slip on the floor: spheres, with the sites at their centres.
 
     Args:
         model: The robot.
@@ -87,12 +87,13 @@ class _Legs:
         if (
             min(*joints, *servos, *touch, root) < 0
             or model.jnt_type[model.body_jntadr[root]] != mujoco.mjtJoint.mjJNT_FREE
+            or (model.actuator_gear[servos, 0] != 1.0).any()
             or (model.actuator_dyntype[servos] != mujoco.mjtDyn.mjDYN_INTEGRATOR).any()
             or (model.sensor_type[touch] != mujoco.mjtSensor.mjSENS_TOUCH).any()
         ):
             raise InputError(
                 "gait.steps: takes a free robot with sites and <touch> sensors LEG/foot, and joints and <intvelocity> "
-                f"actuators LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
+                f"actuators without a gear LEG/{', LEG/'.join(JOINTS)} of the LEGs {' and '.join(SIDES)}"
             )
         self.named = joints
         self.model, self.key, self.feet, self.servos = model, key, feet, np.array(servos)
@@ -104,13 +105,16 @@ class _Legs:
         self.torso = data.qpos[self.root[0] : self.root[0] + 3].copy()
         self.hips = np.array([data.xanchor[joints[3 * leg]] for leg in range(2)]) - self.torso
         self.soles = np.array([data.site_xpos[foot] for foot in feet])
+        spheres = (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE) & (model.geom_bodyid == model.site_bodyid[feet[0]])
+        self.radius = float(model.geom_size[spheres, 0].max(initial=0.0))
+        self.height = float(self.centre[2] - self.soles[0, 2] + self.radius)
         self.reach = np.linalg.norm(self.soles - self.torso - self.hips, axis=1) - self.start[self.q[:, 2]]
 
     def walk(self, gait: Gait, dt: float) -> Walk:
         """See `plan_walk`."""
         plan = Plan(gait, float(self.soles[0, 1] - self.torso[1]))
         time = dt * np.arange(math.ceil(plan.duration_s / dt) + 1)
-        pole = math.sqrt(float(np.linalg.norm(self.model.opt.gravity)) / self.centre[2])
+        pole = math.sqrt(float(np.linalg.norm(self.model.opt.gravity)) / self.height)
         planned, shares = plan.feet(time), plan.load(time)
         torso, feet = plan.mass_centre(time, pole), planned
         qpos = self.joints(torso, feet)
@@ -140,7 +144,7 @@ class _Legs:
             self.servos,
             setpoints,
             np.stack(leaning, axis=-1),
-            float(self.centre[2]),
+            self.height,
             acceleration,
         )
 
@@ -161,8 +165,7 @@ class _Legs:
     def ways(self, qpos: np.ndarray) -> np.ndarray:
         """Return how far balls under the legs would have rolled from the start, (2, n, 3) [m]."""
         roll, pitch = (qpos[:, self.q[:, i]].T for i in range(2))
-        radius = self.soles[:, 2:]  # of a foot that is a ball: its centre's height over the floor
-        return np.stack([radius * pitch, -radius * roll, 0.0 * roll], axis=-1)
+        return np.stack([self.radius * pitch, -self.radius * roll, 0.0 * roll], axis=-1)
 
     def _check_reach(self, time: np.ndarray, qpos: np.ndarray) -> None:
         """Refuse joint positions beyond the joints' ranges."""
@@ -172,8 +175,8 @@ class _Legs:
             worst = int(np.argmax(np.maximum(low - way, way - high)))
             if self.model.jnt_limited[joint] and not low <= way[worst] <= high:
                 raise InputError(
-                    f"gait: the plan takes {self.model.joint(joint).name} to {way[worst]:.3g} at t = {time[worst]:.2f} "
-                    f"s, and its range is {low:.3g} to {high:.3g}; take shorter steps, or lift the feet less"
+                    f"gait.step_length_m, width_m, lift_m: take {self.model.joint(joint).name} to {way[worst]:.3g} at "
+                    f"t = {time[worst]:.2f} s, and its range is {low:.3g} to {high:.3g}; make one of them smaller"
                 )
 
     def dynamics(self, qpos: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

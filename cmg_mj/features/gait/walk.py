@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -16,35 +16,81 @@ from cmg_mj.features.gait import Gait
 from cmg_mj.features.gait.lean import Lean
 from cmg_mj.features.gait.legs import SIDES, Walk, plan_walk
 from cmg_mj.features.gait.switches import FootSwitches
+from cmg_mj.inputs.features import Judgement
 from cmg_mj.plant.plant import Plant
+from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 
 PLAN_S = 0.005
 """Time between two points of a plan [s]."""
 RECENTRED_S = 1.0
 """Time constant in which gimbals come back that turn nothing: the feet hold that direction [s]."""
+LEAST_LEAN_S = 0.2
+"""A torso moved faster shakes its accelerometers [s]."""
 CAUGHT_S = 0.02
 """Time constant in which a rate that the feet hold leaves the observers' model [s]."""
 
 
-@cache
 def planned(plant: Plant, gait: Gait) -> Walk:
     """Plan a walk for a plant as its file has it: no equilibrium bias is known."""
-    return plan_walk(plant.filed.model, plant.key, gait, PLAN_S)
+    return _planned(plant.filed.model, plant.key, gait)
+
+
+@lru_cache(maxsize=8)
+def _planned(model: mujoco.MjModel, key: int, gait: Gait) -> Walk:
+    return plan_walk(model, key, gait, PLAN_S)
 
 
 def check_gait(scenario: Scenario, plant: Plant) -> None:
     """Refuse a gait that the plant cannot walk.
 
     Raises:
-        InputError: The plant is no such robot, or its legs do not reach so far.
+        InputError: The plant is no such robot, its legs do not reach so far, the run is too short, or something else
+            moves the legs.
     """
     gait: Gait = scenario.section("gait")
     if not gait.steps:
+        if gait.tiles_m:
+            raise InputError(f"gait.tiles_m = {gait.tiles_m:g}: are laid along a walk; set gait.steps")
         return
-    planned(plant, gait)
+    stands = gait.stand_s + gait.steps * (gait.double_s + gait.single_s) + gait.double_s
+    if stands > scenario.duration_s + 1e-9:
+        raise InputError(
+            f"gait.steps = {gait.steps}: end at {stands:g} s, and duration_s = {scenario.duration_s:g}; make it "
+            "longer, or take fewer steps"
+        )
+    if 0.0 < gait.lean_s < LEAST_LEAN_S:
+        raise InputError(f"gait.lean_s = {gait.lean_s:g}: must be 0 or at least {LEAST_LEAN_S:g}")
+    walk = planned(plant, gait)
     if len(plant.axes) != 2:
-        raise InputError(f"gait.steps = {gait.steps}: takes a robot that tilts about two axes; leave locked_axes out")
+        raise InputError(f"gait.steps = {gait.steps}: takes a robot that tilts about two axes")
+    legs = {plant.model.actuator(i).name for i in walk.servos}
+    for i, track in enumerate(scenario.feature_sections.get("track", ())):
+        from cmg_mj.features.track.motion import read_columns  # only where there is such a feature
+
+        if both := legs.intersection(read_columns(track.files[0]).names):
+            raise InputError(
+                f"track.{i}.file: moves {sorted(both)[0]}, as [gait] does; leave that column or gait.steps out"
+            )
+
+
+def describe_gait(design: Design, plant: Plant) -> Judgement:
+    """Describe the walk."""
+    gait: Gait = design.scenario.section("gait")
+    if not gait.steps:
+        return Judgement()
+    walk, sensor = planned(plant, gait), design.scenario.sensors.accelerometer
+    way = walk.feet[:, -1, 0].max() - walk.feet[:, 0, 0].max()
+    row = f"{gait.steps} steps, {way:.3g} m, until {walk.plan.duration_s - gait.stand_s:g} s"
+    hints = (
+        []
+        if sensor.averaged
+        else [
+            "[gait]: the legs' servos shake accelerometers that show instants; "
+            "set sensors.accelerometer.averaged = true"
+        ]
+    )
+    return Judgement([("gait", row)], hints)
 
 
 def walking(gait: Gait, plant: Plant) -> Callable[[Controller], Walking] | None:

@@ -18,6 +18,9 @@ from cmg_mj.plant.elements import element_id
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.schema import Scenario
 
+HUGE = 1e6
+"""No setpoint is larger."""
+
 
 class Columns(NamedTuple):
     """A file's setpoints."""
@@ -49,15 +52,15 @@ def _read(path: Path, _changed_ns: int, _size: int) -> Columns:
 
     try:
         table = pacsv.read_csv(path)
+        names = [name.strip() for name in table.column_names]
+        if len(names) < 2 or not table.num_rows or names[0] != "time_s":
+            raise InputError(f"{path}: must have a heading, time_s,ACTUATOR with a column an actuator, and rows")
+        for name, column in zip(names, table.columns, strict=True):
+            if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+                raise InputError(f"{path}: column {shown(name)}: must hold numbers alone, with a point and no unit")
+        times, *columns = (column.cast(pa.float64(), safe=False).to_numpy() for column in table.columns)
     except (pa.ArrowException, OSError, UnicodeError) as error:
         raise InputError(f"{path}: cannot be read as CSV: {' '.join(str(error).split())}") from error
-    names = [name.strip() for name in table.column_names]
-    if len(names) < 2 or not table.num_rows:
-        raise InputError(f"{path}: must have a heading, as time_s,ACTUATOR, a column an actuator, and rows")
-    for name, column in zip(names, table.columns, strict=True):
-        if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
-            raise InputError(f"{path}: column {shown(name)}: must hold numbers alone, with a point and no unit")
-    times, *columns = (column.cast(pa.float64()).to_numpy() for column in table.columns)
     setpoints = np.column_stack(columns)
     wrong = np.flatnonzero(
         ~np.isfinite(times) | ~np.isfinite(setpoints).all(axis=1) | (np.diff(times, prepend=-np.inf) <= 0.0)
@@ -81,22 +84,48 @@ def check_tracks(scenario: Scenario, plant: Plant) -> None:
     for i, track in enumerate(scenario.section("track")):
         field = f"track.{i}.file"
         try:
-            names, _, setpoints = read_columns(track.file)
+            names, times, setpoints = read_columns(track.file)
         except InputError as error:
             raise InputError(f"{field}: {error}") from error
-        for name, first in zip(names, setpoints[0], strict=True):
+        if track.start_s + times[0] >= scenario.duration_s:
+            raise InputError(f"{field}: {track.file}: begins at {track.start_s + times[0]:g} s, when the run has ended")
+        for name, way in zip(names, setpoints.T, strict=True):
+            column = f"{field}: {track.file}: column {shown(name)}"
             if name not in others:
                 what = nearest(name, others) if others else f"{plant.path} has none beside gimbals and flywheels"
-                raise InputError(f"{field}: {track.file}: column {shown(name)}: no such actuator to move; {what}")
+                raise InputError(f"{column}: no such actuator to move; {what}")
             if name in moved:
-                raise InputError(f"{field}: {track.file}: column {shown(name)}: track.{moved[name]} moves it already")
+                raise InputError(f"{column}: track.{moved[name]} moves it already")
             moved[name] = i
-            state = model.actuator_actadr[model.actuator(name).id]
-            if state >= 0 and abs(first - (start := model.key_act[plant.key, state])) > 1e-6:
-                raise InputError(
-                    f"{field}: {track.file}: column {shown(name)} begins at {first:g}, and the keyframe has it at "
-                    f"{start:g}, from where an actuator with a state starts"
-                )
+            _check_way(column, plant, model.actuator(name).id, way)
+
+
+def _check_way(column: str, plant: Plant, actuator: int, way: np.ndarray) -> None:
+    """Refuse setpoints that an actuator does not take, and one whose joint is held."""
+    model, state = plant.model, plant.model.actuator_actadr[actuator]
+    limited, ranges = (
+        (model.actuator_ctrllimited, model.actuator_ctrlrange)
+        if state < 0
+        else (model.actuator_actlimited, model.actuator_actrange)
+    )
+    low, high = ranges[actuator] if limited[actuator] else (-HUGE, HUGE)
+    if not low <= way.min() <= way.max() <= high:
+        raise InputError(
+            f"{column}: goes from {way.min():g} to {way.max():g}, and the actuator takes {low:g} to {high:g}"
+        )
+    if state >= 0 and abs(way[0] - (start := model.key_act[plant.key, state])) > 1e-6:
+        raise InputError(
+            f"{column} begins at {way[0]:g}, and the keyframe has it at {start:g}, from where an actuator with a state "
+            "starts"
+        )
+    joint = int(model.actuator_trnid[actuator, 0])
+    by_joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
+    holding = (model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (model.eq_obj1id == joint) & (model.eq_active0 > 0)
+    if by_joint and holding.any():
+        raise InputError(
+            f"{column}: an equality of the model holds the joint {model.joint(joint).name!r}; of a mounted robot: "
+            f"mount it with --hold servos, or --release {model.joint(joint).name}"
+        )
 
 
 def track_motion(

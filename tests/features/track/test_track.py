@@ -46,6 +46,10 @@ def test_the_joints_follow_in_one_world_and_in_many(tmp_path: Path) -> None:
         ("time_s,left/hip_pitch\n0,0\n0,1\n", "row 2: must hold finite numbers, and times that grow"),
         ("time_s,left/hip_pitch\n0,zero\n", "must hold numbers alone"),
         ("time_s\n0\n", "must have a heading"),
+        ("time_ms,left/hip_pitch\n0,0\n", "must have a heading, time_s,ACTUATOR"),
+        ("time_s,left/hip_pitch\n0,0\n1,1e300\n", "goes from 0 to 1e\\+300, and the actuator takes -1e\\+06"),
+        ("time_s,left/hip_pitch\n9,0\n", "begins at 9 s, when the run has ended"),
+        ("time_s,left/hip_pitch\n0,9007199254740993\n", "begins at|goes from"),
     ],
 )
 def test_what_does_not_fit_is_named(tmp_path: Path, text: str, complaint: str) -> None:
