@@ -671,9 +671,13 @@ def _bundled_table() -> str:
 
 
 def _section(section: str, cls: type) -> str:
-    heading = {"": "Top of the file", "push": "`[[push]]`", "swing": "`[[swing]]`", "pivot": "`[[pivot]]`"}.get(
-        section, f"`[{section}]`"
-    )
+    heading = {
+        "": "Top of the file",
+        "push": "`[[push]]`",
+        "track": "`[[track]]`",
+        "swing": "`[[swing]]`",
+        "pivot": "`[[pivot]]`",
+    }.get(section, f"`[{section}]`")
     parts = [f"## {heading}", "" if cls is Scenario else _about(cls)]
     parts += [_prose(SECTION_NOTES.get(section, "")), _field_table(rows_of(section, cls))]
     if cls is Pivot:
