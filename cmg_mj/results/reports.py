@@ -69,11 +69,17 @@ def comparison_tables(summaries: Sequence[Row], title: str) -> list[Table]:
 
 def comparison_note(summaries: Sequence[Row]) -> str:
     """Explain the tables of a comparison."""
+    falls = [
+        f"{summary['observer']} at {summary['fell_from_to_s'][0]:.1f} to {summary['fell_from_to_s'][1]:.1f} s"
+        for summary in summaries
+        if summary.get("fell_from_to_s")
+    ]
+    note = f"{ABOUT_COMPARISONS}\nFell: {', '.join(falls)}." if falls else ABOUT_COMPARISONS
     loop = next((summary["in_loop_of"] for summary in summaries if "in_loop_of" in summary), None)
     if not loop:
-        return ABOUT_COMPARISONS
+        return note
     floors = about_floors([summary["observer"] for summary in summaries])
-    return f"{ABOUT_COMPARISONS}\nOpen loop, on the motion of {loop}, the best:\n{ABOUT_BASELINES}\n{floors}"
+    return f"{note}\nOpen loop, on the motion of {loop}, the best:\n{ABOUT_BASELINES}\n{floors}"
 
 
 def comparison_table(summaries: Sequence[Row], title: str) -> Group:

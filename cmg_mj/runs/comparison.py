@@ -52,7 +52,7 @@ class ComparedObserver:
     def summary(self) -> Summary:
         """Means over the worlds that stood to the end, by the names of a run's summary, and the share of falls."""
         result, scenario = self.result, self.experiment.scenario
-        worlds = len(result.outcomes)
+        worlds, falls = len(result.outcomes), [outcome.time_s for outcome in result.outcomes if outcome.fell]
         return finite(
             {
                 "observer": scenario.observer.kind,
@@ -61,6 +61,7 @@ class ComparedObserver:
                 "worlds": worlds,
                 "fell": bool(result.fell.any()),
                 "fell_fraction": float(result.fell.mean()),
+                "fell_from_to_s": [min(falls), max(falls)] if falls else None,
                 "stopped_fraction": len(self.stopped) / worlds,
                 "settled_fraction": sum(summary["settle_time_s"] is not None for summary in result.summaries) / worlds,
                 **{key: result.mean(key) for key in result.summaries[0] if key not in NESTED},
