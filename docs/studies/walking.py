@@ -10,10 +10,15 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from cmg_mj.features.gait import walk as stage
+from cmg_mj.features.gait.legs import Walk
+from cmg_mj.features.gait.walk import planned
 from cmg_mj.inputs.files import folder
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
@@ -90,12 +95,21 @@ GROUPS: dict[str, Rows] = {
         ("hips of 2000 N m/rad", 0.0, [QUIET, "plant.model=SOFT"]),
         ("hips of 2000 N m/rad, homogeneous", 0.0, [QUIET, "plant.model=SOFT", "observer.kind=homogeneous"]),
     ],
+    "known": [
+        (f"{share:.0%} of the planned acceleration", 0.0, [QUIET, f"KNOWN={share}"])
+        for share in (0, 0.8, 0.9, 1.1, 1.2)
+    ],
     "steps": [
         (f"{integrator}, {step} s", 0.0, [QUIET, f"plant.integrator={integrator}", f"plant.timestep_s={step}"])
         for integrator in ("RK4", "implicitfast")
         for step in (0.0025, 0.001, 0.0005)
     ],
 }
+
+
+def scaled(plan: Walk, share: float) -> Walk:
+    """Return a plan whose acceleration is known so well only."""
+    return replace(plan, acceleration=share * plan.acceleration)
 
 
 def walk(worlds: int, label: str, e_deg: float, settings: Sequence[str]) -> str:
@@ -114,9 +128,15 @@ def walk(worlds: int, label: str, e_deg: float, settings: Sequence[str]) -> str:
         )
         soft.write_text(text.replace('"cube.xml"', f'"{folder("models") / "cube.xml"}"'), encoding="utf-8")
         settings = [setting.replace("SOFT", str(soft)) for setting in settings]
+    share = [float(setting.removeprefix("KNOWN=")) for setting in settings if setting.startswith("KNOWN=")]
+    settings = [setting for setting in settings if not setting.startswith("KNOWN=")]
     start = [f"axes.{axis}.plant.equilibrium_bias_deg=0.0" for axis in ("roll", "pitch")]
     own = own if e_deg else None
-    result = prepare(load_scenario("walk", [*start, *settings])).run_many(worlds, settings=own, keep_trajectory=False)
+    experiment = prepare(load_scenario("walk", [*start, *settings]))
+    with pytest.MonkeyPatch.context() as patch:
+        if share:
+            patch.setattr(stage, "planned", lambda *arguments: scaled(planned(*arguments), share[0]))
+        result = experiment.run_many(worlds, settings=own, keep_trajectory=False)
     walked = int((result.stood).sum())
     figures = [
         "-" if (mean := result.mean(key)) is None else f"{mean:{digits}}"
