@@ -26,6 +26,7 @@ from cmg_mj.observers import Observer
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.plant.physics import ManyWorlds, OneWorld
 from cmg_mj.plant.plant import Plant, check_axes, load_scenario_plant
+from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.results.folder import whole_file
 from cmg_mj.results.result import Outcome, Result
 from cmg_mj.results.summary_keys import combine_axes
@@ -364,10 +365,10 @@ class Experiment:
         """
         if len(self.several) > 1:
             names = self.plant.axis_names
-            raise InputError(
-                f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one; lock the "
-                f'others, as with --set plant.locked_axes=["{names[-1]}"]'
-            )
+            several = f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one"
+            if not isinstance(self.plant.axes[-1].line, HingeLine):
+                raise InputError(several)
+            raise InputError(f'{several}; lock the others, as with --set plant.locked_axes=["{names[-1]}"]')
         return self.axes[0]
 
     def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:

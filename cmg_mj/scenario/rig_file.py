@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -121,6 +122,9 @@ class Rig(BaseModel):
             fields["plant.tilt_inertia_kg_m2"] = self.pendulum.inertia
             fields["plant.tilt_gravity_n_m"] = self.pendulum.gravity_torque
             fields["plant.flywheel_momentum_n_m_s"] = self.pendulum.momentum
+        elif with_pendulum and self.pendulum:
+            text = "hint: %s: its pendulum is left out, since the momentum of its flywheels is not known"
+            logging.getLogger("cmg_mj").warning(text, source)
         return {field: float(f"{value:.6g}") for field, value in fields.items()}
 
 

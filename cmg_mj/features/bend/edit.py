@@ -87,10 +87,9 @@ def _axis_to_bend(rig: ResolvedModel, section: Bend) -> tuple[Axis, HingeLine]:
     """Find the only axis and its hinge, or say why the rig cannot bend."""
     setting, rigid = f"bend.frequency_hz = {section.frequency_hz:g}: {rig.path}", rig.model
     if len(rig.axes) > 1:
-        raise InputError(
-            f"{setting} tilts about several axes, and a bend takes one; lock the others, as with "
-            f'--set plant.locked_axes=["{rig.axes[-1].name}"]'
-        )
+        lock = f'; lock the others, as with --set plant.locked_axes=["{rig.axes[-1].name}"]'
+        can_lock = isinstance(rig.axes[-1].line, HingeLine)
+        raise InputError(f"{setting} tilts about several axes, and a bend takes one{lock if can_lock else ''}")
     if element_id(rigid, "joint", BEND_JOINT) >= 0 or element_id(rigid, "body", BEND_JOINT) >= 0:
         raise InputError(f"{setting} has a body or joint {BEND_JOINT!r} already, which is what a bend adds")
     axis = next(iter(rig.axes))
