@@ -32,7 +32,7 @@ MAX_TILES = 200
 TILE_COLORS = ((150, 156, 164), (132, 138, 147))
 POSES = 25
 """Number of poses of a run that the ball encloses."""
-MAX_TRAVEL = 2.0
+MAX_TRAVEL = 6.0
 """A rig that travels farther than so many radii is shown at its start."""
 CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
 
