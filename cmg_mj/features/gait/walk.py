@@ -23,7 +23,7 @@ from cmg_mj.scenario.schema import Scenario
 
 PLAN_S = 0.005
 """Time between two points of a plan [s]."""
-RECENTRED_S = 1.0
+RECENTRED_S = 0.5
 """Time constant in which gimbals come back that turn nothing: the feet hold that direction [s]."""
 LEAST_LEAN_S = 0.2
 """A torso moved faster shakes its accelerometers [s]."""
