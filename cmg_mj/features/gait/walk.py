@@ -15,6 +15,7 @@ from cmg_mj.core.types import MultiAxisReading, Setpoints
 from cmg_mj.features.gait import Gait
 from cmg_mj.features.gait.lean import Lean
 from cmg_mj.features.gait.legs import SIDES, Walk, plan_walk
+from cmg_mj.features.gait.plan import Plan
 from cmg_mj.features.gait.switches import FootSwitches
 from cmg_mj.inputs.features import Judgement
 from cmg_mj.plant.plant import Plant
@@ -53,7 +54,7 @@ def check_gait(scenario: Scenario, plant: Plant) -> None:
         if gait.tiles_m:
             raise InputError(f"gait.tiles_m = {gait.tiles_m:g}: are laid along a walk; set gait.steps")
         return
-    stands = gait.stand_s + gait.steps * (gait.double_s + gait.single_s) + gait.double_s
+    stands = Plan(gait, 0.0).duration_s - gait.stand_s
     if stands > scenario.duration_s + 1e-9:
         raise InputError(
             f"gait.steps = {gait.steps}: end at {stands:g} s, and duration_s = {scenario.duration_s:g}; make it "
