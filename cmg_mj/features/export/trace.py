@@ -9,6 +9,7 @@ import casadi
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import GimbalAngle, PairTilt
+from cmg_mj.core.tree import Leaf, form, numbers, rebuild
 from cmg_mj.core.types import Law, Measurement, Observer, extra_signals, feedback_state, reads_gyro
 from cmg_mj.features.export.constants import Constants
 from cmg_mj.features.export.names import identifiers
@@ -26,7 +27,6 @@ from cmg_mj.features.export.symbol import (
     symbols_named,
 )
 from cmg_mj.laws.state_feedback import StateFeedback
-from cmg_mj.linear.slopes import Leaf, form, numbers, rebuild
 
 
 class Traced(NamedTuple):

@@ -14,7 +14,7 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.stats import qmc
 
 from cmg_mj.core.errors import InputError, nearest
-from cmg_mj.linear.slopes import numbers, rebuild
+from cmg_mj.core.tree import numbers, rebuild
 from cmg_mj.observers import OBSERVER_CLASSES, Observer
 from cmg_mj.observers.parameter_options import ParameterValue
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.linear.slopes import form, numbers, rebuild
+from cmg_mj.core.tree import form, numbers, rebuild
 from cmg_mj.observers import Measurement
 from tests.features.export import own
 from tests.features.export.compiled import controller
