@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from enum import IntEnum, unique
+from itertools import count
 
 import numpy as np
 
@@ -43,28 +44,69 @@ class NoiseStream(IntEnum):
         return self + STREAMS_PER_AXIS * axis
 
 
-def normals(seed: int, world_ids: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
-    """Standard normal numbers, sample after sample, that depend on (seed, world, stream) alone.
+BLOCK = 256
+"""Samples that are drawn together: one by one they cost more than the rest of a sensor."""
+
+
+class Normals:
+    """Standard normal numbers that depend on (seed, world, stream) and the number of their sample alone.
+
+    Samples may be asked for in any order. Those that follow on each other are drawn once; for those before, the
+    generators' states at the beginning of each block are kept.
 
     Args:
         seed: The run's seed.
         world_ids: The number of one world, on floats, or the numbers of many, on arrays.
         stream: `NoiseStream.on_axis` of the sensor and its axis.
         channels: Numbers a sample.
-
-    Yields:
-        One sample: `channels` floats, or an array (channels, n_worlds).
     """
-    block = 256  # drawing one by one costs more than the rest of a sensor
-    single = isinstance(world_ids, int)
-    different, places = np.unique([world_ids] if single else world_ids, return_inverse=True)
-    alone = np.array_equal(places, range(len(places)))  # every world once, in order
-    generators = [
-        np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
-    ]
-    while True:
-        drawn = np.stack([g.standard_normal((block, channels)) for g in generators], axis=-1)
-        yield from drawn[:, :, 0].tolist() if single else drawn if alone else drawn[:, :, places]
+
+    def __init__(self, seed: int, world_ids: int | Sequence[int], stream: int, channels: int) -> None:
+        self._single = isinstance(world_ids, int)
+        different, places = np.unique([world_ids] if self._single else world_ids, return_inverse=True)
+        self._places = None if np.array_equal(places, range(len(places))) else places  # every world once, in order
+        self._generators = [
+            np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(world), stream))) for world in different
+        ]
+        self._channels = channels
+        self._starts = [self._positions()]
+        self._number = -1
+        self._block: Sequence[Sequence[Scalar]] = ()
+
+    def __call__(self, sample: int) -> Sequence[Scalar]:
+        """Return the numbers of a sample: `channels` floats, or an array (channels, n_worlds)."""
+        number = sample // BLOCK
+        if number != self._number:
+            self._block = self._block_of(number)
+            self._number = number
+        return self._block[sample % BLOCK]
+
+    def _block_of(self, number: int) -> Sequence[Sequence[Scalar]]:
+        first = min(number, len(self._starts) - 1)
+        drawn = np.empty(0)
+        for earlier in range(first, number + 1):
+            drawn = self._drawn(earlier)
+        if self._single:
+            return drawn[:, :, 0].tolist()
+        return drawn if self._places is None else drawn[:, :, self._places]
+
+    def _drawn(self, number: int) -> np.ndarray:
+        """Draw a block whose beginning is known; (BLOCK, channels, different worlds)."""
+        for generator, position in zip(self._generators, self._starts[number], strict=True):
+            before = generator.bit_generator.state
+            generator.bit_generator.state = {**before, "state": {**before["state"], "state": position}}
+        drawn = [generator.standard_normal((BLOCK, self._channels)) for generator in self._generators]
+        if number + 1 == len(self._starts):
+            self._starts.append(self._positions())
+        return np.stack(drawn, axis=-1)
+
+    def _positions(self) -> list[int]:
+        return [generator.bit_generator.state["state"]["state"] for generator in self._generators]
+
+
+def normals(seed: int, world_ids: int | Sequence[int], stream: int, channels: int) -> Iterator[Sequence[Scalar]]:
+    """Yield the `Normals` of one sample after the other."""
+    return map(Normals(seed, world_ids, stream, channels), count())
 
 
 CORNERS_HZ = (0.01, 0.1, 1.0, 10.0)

@@ -1,0 +1,237 @@
+"""Prints what a pure function did as straight-line Python: its operations alone, on floats, to the last bit.
+
+A tick of one world is a chain of small functions, whose calls take longer than the arithmetic. Recorded once and
+printed, it takes half the time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from cmg_mj.core.errors import InputError
+from cmg_mj.core.tape import CHOICE, CONSTANT, INPUT, Symbol, Tape
+
+SAME_IN_MATH = ("sqrt", "exp", "sin", "cos", "tan")
+PYTHON = {
+    **{name: f"{name}({{0}})" for name in SAME_IN_MATH},
+    "copysign": "copysign({0}, {1})",
+    "hypot": "hypot({0}, {1})",
+    "add": "{0} + {1}",
+    "subtract": "{0} - {1}",
+    "multiply": "{0} * {1}",
+    "divide": "{0} / {1}",
+    "negative": "-{0}",
+    "absolute": "abs({0})",
+    "sign": "float(({0} > 0.0) - ({0} < 0.0))",
+    "maximum": "{1} if {0} < {1} else {0}",
+    "minimum": "{1} if {0} > {1} else {0}",
+    "power": "{0} ** {1}",
+    "float_power": "{0} ** {1}",
+    "arctan2": "atan2({0}, {1})",
+    "rint": "round({0})",
+    "less": "{0} < {1}",
+    "less_equal": "{0} <= {1}",
+    "greater": "{0} > {1}",
+    "greater_equal": "{0} >= {1}",
+    "equal": "{0} == {1}",
+    "not_equal": "{0} != {1}",
+    "logical_and": "{0} and {1}",
+    "logical_or": "{0} or {1}",
+    "logical_not": "not {0}",
+    "bitwise_and": "{0} and {1}",
+    "bitwise_or": "{0} or {1}",
+    "invert": "not {0}",
+    CHOICE: "{1} if {0} else {2}",
+}
+"""NumPy's function -> Python on floats."""
+ARGUMENT_TWICE = ("sign", "maximum", "minimum")
+LONGEST = 120
+"""Longest expression that is written where it is used [characters]."""
+
+Tables = Mapping[Any, Callable[[int], Sequence[Any]]]
+"""Numbers that are looked up and not computed, such as noise: key -> function of a number, such as a sample's."""
+
+
+class Count(int):
+    """A whole number while a function is recorded: it is looked up with, and it is counted on."""
+
+    text: str
+
+    def __new__(cls, value: int, text: str) -> Count:
+        """Make a count of an input's name."""
+        count = super().__new__(cls, value)
+        count.text = text
+        return count
+
+    def __add__(self, more: int) -> Count:
+        return Count(int(self) + more, f"{self.text} + {more}")
+
+
+class _Recorder:
+    """Replaces the numbers of trees by symbols, and prints the function."""
+
+    def __init__(self) -> None:
+        self.tape = Tape()
+        self.lines: list[str] = []
+        self.known: dict[str, Any] = {**vars(math), "new": tuple.__new__, "with_more": _with_more}
+        self._inputs = 0
+        self._draws: dict[tuple[Any, str], Sequence[Symbol]] = {}
+
+    def _name(self, letter: str) -> str:
+        self._inputs += 1
+        return f"{letter}{self._inputs}"
+
+    def given(self, tree: Any) -> tuple[str, Any]:
+        """Return a pattern of names for a tree, and the tree with symbols and counts in the place of its numbers."""
+        if type(tree) is float:
+            name = self._name("x")
+            return name, self.tape.input(name)
+        if type(tree) is int:
+            name = self._name("i")
+            return name, Count(tree, name)
+        if not isinstance(tree, (tuple, list)):
+            return "_", tree
+        if not tree:
+            return "_", tree
+        patterns, parts = zip(*map(self.given, tree), strict=True)
+        pattern = f"({', '.join(patterns)},)"
+        if type(tree) in (tuple, list):
+            return pattern, type(tree)(parts)
+        made = tuple.__new__(type(tree), parts)
+        if more := getattr(tree, "__dict__", {}):
+            whole = self._name("y")
+            self.lines.append(f"{pattern} = {whole}")
+            for key, value in more.items():
+                inner, part = self.given(value)
+                self.lines.append(f"{inner} = {whole}.{key}")
+                setattr(made, key, part)
+            return whole, made
+        return pattern, made
+
+    def table(self, key: Any, channels: Callable[[int], Sequence[Any]]) -> Callable[[int], Sequence[Any]]:
+        """Return what looks up in a table while the function is recorded."""
+
+        def look_up(number: int) -> Sequence[Any]:
+            if not isinstance(number, Count):
+                raise InputError(f"a table is looked up at {number}, which is no input")
+            looked = key, number.text
+            if looked not in self._draws:
+                width = len(channels(number))
+                names = [self._name("n") for _ in range(width)]
+                table = self._constant(key)
+                self.lines.append(f"({', '.join(names)},) = tables[{table}]({number.text})")
+                self._draws[looked] = list(map(self.tape.input, names))
+            return self._draws[looked]
+
+        return look_up
+
+    def _constant(self, value: Any) -> str:
+        if value is None or type(value) in (bool, int, str):
+            return repr(value)
+        name = f"k{len(self.known)}"
+        self.known[name] = value
+        return name
+
+    def printed(self, tree: Any, texts: Mapping[int, str]) -> str:
+        """Print the expression of a tree of results."""
+        if isinstance(tree, Symbol):
+            return texts[tree.place]
+        if isinstance(tree, Count):
+            return tree.text
+        if type(tree) is float:
+            return _literal(tree)
+        if not isinstance(tree, (tuple, list)):
+            return self._constant(tree)
+        parts = [self.printed(part, texts) for part in tree]
+        if type(tree) is list:
+            return f"[{', '.join(parts)}]"
+        whole = f"({', '.join(parts)}{',' if parts else ''})"
+        if type(tree) is tuple:
+            return whole
+        kind = self._constant(type(tree))
+        if more := getattr(tree, "__dict__", {}):
+            values = ", ".join(f"{key!r}: {self.printed(value, texts)}" for key, value in more.items())
+            return f"with_more({kind}, {whole}, {{{values}}})"
+        return f"new({kind}, {whole})"
+
+
+def straight_line(function: Callable[..., Any], trees: Sequence[Any], tables: Tables) -> Callable[..., Any]:
+    """Record a pure function and return it as straight-line Python.
+
+    The result takes trees of the same form as the given ones, with other numbers, and other tables. It raises
+    `ArithmeticError` or `ValueError` where the function on floats may do otherwise.
+
+    Args:
+        function: Takes the trees and the tables. It has no branch on a float; what it does with whole numbers it does
+            at every call, but for looking up at them and counting on.
+        trees: Arguments to record it with: floats and whole numbers in tuples and lists.
+        tables: Tables to record it with.
+
+    Returns:
+        The function.
+
+    Raises:
+        InputError: The function cannot be recorded.
+    """
+    recorder = _Recorder()
+    patterns, arguments = zip(*map(recorder.given, trees), strict=True)
+    result = function(*arguments, {key: recorder.table(key, table) for key, table in tables.items()})
+    places = [symbol.place for symbol in _symbols(result)]
+    texts, body = _operations(recorder.tape, places)
+    names = [f"a{i}" for i in range(len(trees))]
+    unpacked = [f"{pattern} = {name}" for pattern, name in zip(patterns, names, strict=True)]
+    lines = [*unpacked, *_ordered(recorder.lines), *body, f"return {recorder.printed(result, texts)}"]
+    source = f"def run({', '.join(names)}, tables):\n" + "".join(f"    {line}\n" for line in lines)
+    exec(compile(source, f"<{function.__qualname__}, printed>", "exec"), recorder.known)
+    return recorder.known["run"]
+
+
+def _ordered(lines: Sequence[str]) -> list[str]:
+    """Bring what unpacks a part behind what names it: an inner part's lines were written first."""
+    unpacking = [line for line in lines if "tables[" not in line]
+    return [*reversed(unpacking), *(line for line in lines if "tables[" in line)]
+
+
+def _symbols(tree: Any) -> Iterable[Symbol]:
+    if isinstance(tree, Symbol):
+        yield tree
+    elif isinstance(tree, (tuple, list)):
+        for part in (*tree, *getattr(tree, "__dict__", {}).values()):
+            yield from _symbols(part)
+
+
+def _operations(tape: Tape, results: Sequence[int]) -> tuple[dict[int, str], list[str]]:
+    """Print the needed operations: the text of each place, and the lines before the results."""
+    texts: dict[int, str] = {}
+    lines: list[str] = []
+    for place, users in tape.uses(results).items():
+        operation = tape.operations[place]
+        if operation.name == INPUT:
+            texts[place] = operation.value
+        elif operation.name == CONSTANT:
+            texts[place] = _literal(operation.value)
+        else:
+            template = PYTHON.get(operation.name)
+            if template is None:
+                raise InputError(f"{operation.name}: is not printed as Python")
+            text = template.format(*(texts[argument] for argument in operation.arguments))
+            if len(users) == 1 and len(text) < LONGEST and users[0] not in ARGUMENT_TWICE:
+                texts[place] = f"({text})"
+            else:
+                texts[place] = f"t{place}"
+                lines.append(f"t{place} = {text}")
+    return texts, lines
+
+
+def _literal(value: float) -> str:
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+def _with_more(kind: type, parts: tuple, more: Mapping[str, Any]) -> Any:
+    """Make a named tuple that has attributes beside its fields."""
+    made = tuple.__new__(kind, parts)
+    made.__dict__.update(more)
+    return made
