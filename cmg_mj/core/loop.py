@@ -9,16 +9,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.axes import ControllerLike
-from cmg_mj.core.controller import Tick
-from cmg_mj.core.types import IdealReading, MultiAxisReading, Setpoints
+from cmg_mj.core.axis import Tick
+from cmg_mj.core.controller import Controller
+from cmg_mj.core.rig import Readings
+from cmg_mj.core.types import Setpoints
 
 
 class Outside(NamedTuple):
     """What acts on the plant until the next instant."""
 
-    torques: Sequence[Scalar]
-    """About each axis, one for all worlds or (n_worlds,) [N m]."""
+    torques: Sequence[Scalar] | None = None
+    """About each axis, one for all worlds or (n_worlds,); None: no torques [N m]."""
     acceleration: Sequence[Scalar] | None = None
     """The pivot's: x, y, z, likewise; None: it stays what it was, at first zero [m/s^2]."""
     setpoints: Setpoints | None = None
@@ -26,20 +27,40 @@ class Outside(NamedTuple):
 
 
 class Disturbance(Protocol):
-    """Something that acts from outside."""
+    """Something that acts from outside: a function of the physics step."""
 
     edges: Collection[int] = ()
     """Physics steps that become instants."""
     accelerates: bool = False
     """Whether it accelerates the pivot: gravity of the plant's model then changes."""
+    actuators: Sequence[int] = ()
+    """Actuators that it moves."""
 
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """Add what acts from a physics step on, held or averaged for so many steps, until the next instant.
+    def at(self, step: int, steps: int) -> Outside:
+        """Return what acts from a physics step on, held or averaged for so many steps, until the next instant.
 
-        Disturbances act one after the other: each is given what those before it made. Torques that stay are the same
-        sequence.
+        Torques that stay are the same sequence.
         """
         ...
+
+
+def acting(disturbances: Sequence[Disturbance], step: int, steps: int) -> Outside:
+    """Put together what acts from a physics step on: see `Disturbance.at`.
+
+    Args:
+        disturbances: What acts.
+        step: Number of the physics step.
+        steps: Physics steps until the next instant.
+    """
+    if len(disturbances) == 1:
+        return disturbances[0].at(step, steps)
+    parts = [disturbance.at(step, steps) for disturbance in disturbances]
+    torques = [part.torques for part in parts if part.torques is not None]
+    acceleration = next((part.acceleration for part in parts if part.acceleration is not None), None)
+    setpoints = next((part.setpoints for part in parts if part.setpoints is not None), None)
+    if len(torques) > 1:
+        torques = [[sum(about) for about in zip(*torques, strict=True)]]
+    return Outside(torques[0] if torques else None, acceleration, setpoints)
 
 
 def instants(end: int, grid: int, edges: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
@@ -65,7 +86,6 @@ State = tuple[Joints, Joints]
 """Joint angles, joint rates."""
 Acceleration = Sequence[Scalar]
 """Acceleration of the pivot: x, y, z [m/s^2]."""
-Reading = IdealReading | MultiAxisReading
 
 
 class Physics(Protocol):
@@ -98,7 +118,7 @@ class Physics(Protocol):
         """Compute the tilt from the keyframe, of several axes the largest [rad]."""
         ...
 
-    def reading(self, v: Joints) -> Any:
+    def reading(self, v: Joints) -> Readings:
         """Compute what perfect sensors show at the present state, with the torques and the last commands in force."""
         ...
 
@@ -110,7 +130,7 @@ class Physics(Protocol):
         """Set the pivot's acceleration [m/s^2]."""
         ...
 
-    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+    def control(self, actuators: Sequence[int], setpoints: Any) -> None:
         """Set the controls of actuators that are no gimbal's and no flywheel's."""
         ...
 
@@ -177,6 +197,7 @@ class ControlLoop:
     Attributes:
         takes_samples: Whether the loop takes the samples that are due; False if MuJoCo calls the controller.
         step: Number of the physics step at the present instant.
+        readings: Readings of perfect sensors there.
         endings: How worlds ended that are stepped no more, by their index.
     """
 
@@ -185,7 +206,7 @@ class ControlLoop:
     def __init__(
         self,
         physics: Physics,
-        controller: ControllerLike,
+        controller: Controller,
         end: int,
         disturbances: Sequence[Disturbance],
         fall_angle: float,
@@ -193,34 +214,32 @@ class ControlLoop:
         self.physics = physics
         self.controller = controller
         self.step = 0
+        self.readings: Any = None
         self.endings: dict[int, Ending] = {}
         self._end, self._disturbances = end, disturbances
         self._fall_angle = fall_angle
         self._steps = 0
-        self._parts = list(enumerate(controller.axes))
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""
         physics, fall_angle = self.physics, self._fall_angle
         steps_per_sample, period = self.controller.steps_per_sample, self.controller.period
         state, tilt, stop_fallen = physics.state, physics.tilt, physics.stop_fallen
-        sample = self.controller.sample
-        still = Outside([0.0] * len(self._parts))
-        held: Sequence[Scalar] | None = None
-        torques: Sequence[Scalar] = ()
-        edges = [edge for disturbance in self._disturbances for edge in disturbance.edges]
+        disturbances = self._disturbances
+        held: Sequence[Scalar] = [0.0] * len(self.controller.axes)
+        torques = physics.push(held)
+        edges = [edge for disturbance in disturbances for edge in disturbance.edges]
         for step, steps in instants(self._end, steps_per_sample, edges):
             self.step, self._steps = step, steps
-            outside = still
-            for disturb in self._disturbances:
-                outside = disturb(step, steps, outside)
-            if outside.acceleration is not None:
-                physics.accelerate(outside.acceleration)
-            if outside.setpoints is not None:
-                physics.control(*outside.setpoints)
-            if outside.torques is not held:
-                held = outside.torques
-                torques = physics.push(held)
+            if disturbances:
+                about, acceleration, setpoints = acting(disturbances, step, steps)
+                if acceleration is not None:
+                    physics.accelerate(acceleration)
+                if setpoints is not None:
+                    physics.control(*setpoints)
+                if about is not None and about is not held:
+                    held = about
+                    torques = physics.push(held)
             q, v = state()
             for world, angle in stop_fallen(tilt(q), fall_angle):
                 self.endings[world] = Ending(step, angle)
@@ -228,24 +247,26 @@ class ControlLoop:
                 return
             if step % steps_per_sample == 0:
                 if self.takes_samples:
-                    sample(step, physics.reading(v))
+                    self.readings = physics.reading(v)
                 if step % period == 0:
                     yield _new(ControlTick, (step, steps, q, v, torques))
                     continue
+                if self.takes_samples:
+                    self.controller.sample(step, self.readings)
             physics.advance(steps)
 
     def decide(self) -> None:
         """Let the controller decide, and command the servos."""
-        physics = self.physics
-        self.controller.control(self.step)
-        stop_failed = physics.stop_failed
-        for axis, part in self._parts:
-            if stop_failed is not None and part.tick is not None:
-                for world, message in stop_failed(part.tick):
+        physics, controller = self.physics, self.controller
+        controller.update(self.step, self.readings)
+        if physics.stop_failed is not None:
+            for tick in controller.ticks:
+                for world, message in physics.stop_failed(tick):
                     self.endings[world] = Ending(self.step, message=message)
-            physics.command(part.gimbal_rate, axis)
-        if self.controller.setpoints is not None:
-            physics.control(*self.controller.setpoints)
+        for axis, rate in enumerate(controller.gimbal_rates):
+            physics.command(rate, axis)
+        if controller.moves_others:
+            physics.control(*controller.setpoints)
 
     def advance(self) -> None:
         """Take the physics to the next instant."""

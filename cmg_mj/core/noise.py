@@ -130,6 +130,21 @@ def spread_of(floor: float) -> float:
     return k * math.sqrt(math.log(CORNERS_HZ[1] / CORNERS_HZ[0]))
 
 
+def wander_shares(floor: float, dt: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the share of each Gauss-Markov process that is left after a sample, and the spread of what it gains.
+
+    Args:
+        floor: Of the Allan deviation, in the reading's unit.
+        dt: Sample period [s].
+
+    Returns:
+        A number a corner each, the second ones in the reading's unit.
+    """
+    decays = np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
+    spreads = spread_of(floor) * np.sqrt(1.0 - decays**2)
+    return tuple(decays.tolist()), tuple(spreads.tolist())
+
+
 class FlickerNoise:
     """1/f noise at work, as if it had been on for ever.
 
@@ -141,14 +156,13 @@ class FlickerNoise:
     Attributes:
         decay: Share of each corner's process that is left after a sample, a row a corner.
         spread: Standard deviation of what it gains in a sample, likewise, in the reading's unit.
+        wander: The processes, likewise.
     """
 
     def __init__(self, floor: float, dt: float, normals: np.ndarray) -> None:
-        sigma = spread_of(floor)
-        decay = np.exp(-2.0 * math.pi * np.array(CORNERS_HZ) * dt)
-        self.decay = decay.reshape(-1, *[1] * (normals.ndim - 1))
-        self.spread = sigma * np.sqrt(1.0 - self.decay**2)
-        self._wander = sigma * normals
+        decays, spreads = wander_shares(floor, dt)
+        self.decay, self.spread = (np.reshape(shares, (-1, *[1] * (normals.ndim - 1))) for shares in (decays, spreads))
+        self.wander = spread_of(floor) * normals
 
     def advance(self, normals: np.ndarray) -> np.ndarray:
         """Return the noise of the next samples.
@@ -161,6 +175,6 @@ class FlickerNoise:
         """
         driven = self.spread * normals
         for row in driven:
-            row += self.decay * self._wander
-            self._wander = row
+            row += self.decay * self.wander
+            self.wander = row
         return driven.sum(axis=1)

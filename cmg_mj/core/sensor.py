@@ -1,19 +1,30 @@
-"""A sensor at work: a chain of stages, sampled at its rate, delivered after its latency; times on the physics grid."""
+"""A sensor as a value: a chain of stages, sampled at its rate, delivered after its latency; times in physics steps.
+
+A stage is a value too: `init` makes its memory from the first signal, `step` advances it. A signal is a list of
+floats (one world) or an array (channels, n_worlds).
+"""
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar, digitise
+from cmg_mj.core.arrays import Scalar, clip, digitise
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import IdealReading
+
+_new = tuple.__new__
+
+Signal = Sequence[Scalar] | np.ndarray
+Memory = Any
+"""A stage's memory between two samples: numbers in tuples and lists."""
 
 
 def whole_steps(duration: float, timestep: float, field: str, text: str) -> int:
@@ -46,26 +57,6 @@ def steps_until(delay: float, timestep: float) -> int:
     return math.ceil(delay / timestep - 1e-6)
 
 
-class Timing(NamedTuple):
-    """The times that a stage asks of the sampling of its part."""
-
-    inside: int = 0
-    """Physics steps between the samples that the part takes; 0: it takes those that it delivers."""
-    grid: int = 0
-    """Physics steps that must be a multiple of the grid of instants."""
-    settle: int = 0
-    """Samples before the first one, all of the same reading."""
-
-
-SensorStage = Callable[[Any, IdealReading], Any]
-"""An effect on a sensor's signal: (signal, readings of perfect sensors) -> the signal with it.
-
-It is called once a sample that the part takes. The signal is that behind the stages before: of accelerometers four
-forces, or an array (4, n_worlds). A stage may have a `timing`, and a method `watch(step, period, ideal)` that is called
-at every instant, with the physics steps between the samples that the part takes.
-"""
-
-
 class Site(NamedTuple):
     """The place of a part in a run."""
 
@@ -73,89 +64,230 @@ class Site(NamedTuple):
     """The part's section in a scenario, for messages."""
     timestep: float
     """Physics step [s]."""
-    noise: Callable[[NoiseStream, int], Iterator[Sequence[Scalar]]]
-    """Standard normals of a stream: so many a draw, floats or an array (channels, n_worlds)."""
+    axis: int = 0
+    """Number of the axis, on which the noise depends."""
 
     def steps(self, duration: float, field: str, text: str) -> int:
         """Count the physics steps of a time of the part: see `whole_steps`."""
         return whole_steps(duration, self.timestep, f"{self.section}.{field}", text)
 
 
-def shown(limit: float, step: float) -> SensorStage:
-    """Make the stage of range and resolution of every channel.
-
-    Args:
-        limit: Largest reading.
-        step: Of the resolution; 0: readings are not rounded.
-    """
-    limits, steps = repeat(limit), repeat(step)
-
-    def digital(signal: Any, ideal: IdealReading) -> Any:
-        if isinstance(signal, np.ndarray):
-            return digitise(signal, limit, step)
-        return list(map(digitise, signal, limits, steps))
-
-    return digital
-
-
-class SampledSensor:
-    """One sensor at work: it samples at its own rate and delivers after its latency.
-
-    Args:
-        rate_hz: Readings a second.
-        latency_s: Delay from the sampling of a reading to its delivery [s].
-        site: The part's place in the run.
-        signal: Which of the readings of perfect sensors it is, a field of `IdealReading`.
-        stages: The effects on it, the first one first.
+class SensorStage:
+    """An effect on a sensor's signal: by default none, and without memory.
 
     Attributes:
-        steps_per_sample: Physics steps between the instants at which it may be due.
+        draws: Number of a noise stream -> normals that a sample takes of it.
     """
 
-    def __init__(
-        self,
-        rate_hz: float,
-        latency_s: float,
-        site: Site,
-        signal: str,
-        stages: Sequence[SensorStage] = (),
-    ) -> None:
-        timings = [getattr(stage, "timing", Timing()) for stage in stages]
-        self.period = site.steps(1.0 / rate_hz, "rate_hz", f"{rate_hz:g} Hz")
-        self._raw = max((timing.inside for timing in timings), default=0) or self.period
-        self._settle = sum(timing.settle for timing in timings)
-        self.steps_per_sample = math.gcd(self.period, self._raw, *(timing.grid for timing in timings))
-        self._watches = [watch for stage in stages if (watch := getattr(stage, "watch", None))]
-        self._signal, self._stages = IdealReading._fields.index(signal), stages
-        self._latency = steps_until(latency_s, site.timestep)
-        self._on_the_way: deque[tuple[int, Any]] = deque()
-        self._delivered = None
+    draws: Mapping[int, int] = {}
 
-    def sample(self, step: int, ideal: IdealReading) -> None:
-        """Take what is due at a physics step; at the first one, whichever it is, there must be something to show."""
-        for watch in self._watches:
-            watch(step, self._raw, ideal)
-        if self._delivered is None:  # before the start the rig stood still
-            for _ in range(self._settle + 1):
-                self._delivered = self._measure(ideal)
-        elif step % self._raw == 0:
-            signal = ideal[self._signal]
-            for stage in self._stages:  # as `_measure`, at every tick
-                signal = stage(signal, ideal)
-            if step % self.period == 0:
-                if self._latency:
-                    self._on_the_way.append((step + self._latency, signal))
-                else:
-                    self._delivered = signal
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return the memory before the first sample."""
+        return ()
 
-    def _measure(self, ideal: IdealReading) -> Any:
-        signal = ideal[self._signal]
-        for stage in self._stages:
-            signal = stage(signal, ideal)
-        return signal
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """Advance by a sample that the part takes.
 
-    def read(self, step: int) -> Any:
-        """Return the newest sample delivered by a physics step; before the start the rig stood still."""
-        while self._on_the_way and self._on_the_way[0][0] <= step:
-            self._delivered = self._on_the_way.popleft()[1]
-        return self._delivered
+        Args:
+            memory: The memory at the sample before.
+            signal: The signal behind the stages before.
+            ideal: Readings of perfect sensors at the sample.
+            sample: Its number, from 0 on.
+            tables: Noise: number of a stream -> function of the sample's number.
+
+        Returns:
+            The next memory, and the signal with the effect.
+        """
+        return memory, signal
+
+
+def each(formula: Callable[..., Any], signal: Signal, *others: Any) -> Signal:
+    """Apply a formula to every channel: once to an array of all, else to one after the other."""
+    if type(signal) is np.ndarray:
+        return formula(signal, *others)
+    return list(map(formula, signal, *others))
+
+
+def together(formula: Callable[..., tuple], signal: Signal, *others: Any) -> Sequence[Signal]:
+    """Apply a formula with several results to every channel; each result is a signal."""
+    if type(signal) is np.ndarray:
+        return formula(signal, *others)
+    return list(zip(*map(formula, signal, *others), strict=True))
+
+
+@dataclass(frozen=True)
+class Digital(SensorStage):
+    """Range and resolution of every channel.
+
+    Attributes:
+        limit: Largest reading.
+        resolution: Step between two readings; 0: they are not rounded.
+    """
+
+    limit: float
+    resolution: float = 0.0
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        if type(signal) is np.ndarray:
+            return memory, digitise(signal, self.limit, self.resolution)
+        return memory, list(map(digitise, signal, repeat(self.limit), repeat(self.resolution)))
+
+
+@dataclass(frozen=True)
+class Cut(SensorStage):
+    """A range without a resolution.
+
+    Attributes:
+        limit: Largest reading.
+    """
+
+    limit: float
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        return memory, [clip(x, -self.limit, self.limit) for x in signal]
+
+
+class SensorState(NamedTuple):
+    """A sensor's memory."""
+
+    sample: int
+    """Samples that the part has taken."""
+    memories: tuple[Memory, ...]
+    """Memory of each stage."""
+    readings: tuple[Signal, ...]
+    """The last readings, the newest first: so many as the latency spans."""
+    older: tuple[Signal, ...] = ()
+    """The last samples of the part that is read earlier, the newest first."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One sensor at work.
+
+    The age of the reading that is delivered at a step is arithmetic on that step: no state has a time in it.
+
+    Attributes:
+        signal: Which of the readings of perfect sensors it is, a field of `IdealReading`.
+        stages: The effects on it, the first one first.
+        period: Physics steps between two readings.
+        latency: Physics steps from the sampling of a reading to its delivery.
+        inside: Physics steps between the samples that the part takes; 0: it takes those that it delivers.
+        settle: Samples before the first one, all of the same reading.
+        skew: Physics steps by which the second half of the channels is older than the first.
+    """
+
+    signal: str
+    stages: tuple[SensorStage, ...]
+    period: int
+    latency: int = 0
+    inside: int = 0
+    settle: int = 0
+    skew: int = 0
+
+    @cached_property
+    def raw(self) -> int:
+        """Physics steps between the samples that the part takes."""
+        return self.inside or self.period
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Physics steps between the instants at which it may be due."""
+        return math.gcd(self.period, self.raw, self.skew)
+
+    @property
+    def draws(self) -> dict[int, int]:
+        """Number of each noise stream -> normals that a sample takes of it."""
+        return {stream: width for stage in self.stages for stream, width in stage.draws.items()}
+
+    @cached_property
+    def _field(self) -> int:
+        return IdealReading._fields.index(self.signal)
+
+    @cached_property
+    def _is_scalar(self) -> bool:
+        return self.signal == "gyro"
+
+    def init(self, ideal: IdealReading, tables: Tables) -> SensorState:
+        """Start at a reading: before, the rig stood still.
+
+        Args:
+            ideal: Readings of perfect sensors.
+            tables: The noise.
+
+        Returns:
+            The state, with the first sample taken.
+        """
+        taken = self._ideal(ideal)
+        older = (taken,) * (self.skew // self.raw + 1) if self.skew else ()
+        signal = self._joined(taken, older)
+        memories = []
+        for stage in self.stages:
+            memory, signal = stage.step(stage.init(signal, ideal, tables), signal, ideal, 0, tables)
+            memories.append(memory)
+        kept = self.latency // self.period + 2 if self.latency else 1
+        state = SensorState(1, tuple(memories), (signal,) * kept, older)
+        for _ in range(self.settle):
+            state = self._sampled(state, True, ideal, tables)
+        return state._replace(readings=state.readings[:1] * kept)
+
+    def sample(self, state: SensorState, step: int, ideal: IdealReading, tables: Tables) -> SensorState:
+        """Take what is due at a physics step.
+
+        Args:
+            state: The state before it.
+            step: Number of the physics step.
+            ideal: Readings of perfect sensors there.
+            tables: The noise.
+
+        Returns:
+            The next state.
+        """
+        if self.skew and (step + self.skew) % self.raw == 0:
+            state = state._replace(older=(self._ideal(ideal), *state.older[:-1]))
+        if step % self.raw:
+            return state
+        return self._sampled(state, step % self.period == 0, ideal, tables)
+
+    def _sampled(self, state: SensorState, delivers: bool, ideal: IdealReading, tables: Tables) -> SensorState:
+        sample, memories, readings, older = state
+        signal = self._joined(self._ideal(ideal), older)
+        after = []
+        for stage, memory in zip(self.stages, memories, strict=True):
+            memory, signal = stage.step(memory, signal, ideal, sample, tables)
+            after.append(memory)
+        if delivers:
+            readings = (signal, *readings[:-1])
+        return _new(SensorState, (sample + 1, tuple(after), readings, older))
+
+    def read(self, state: SensorState, step: int) -> Signal:
+        """Return the newest reading that has been delivered by a physics step."""
+        if not self.latency:
+            return state.readings[0]
+        return state.readings[step // self.period - (step - self.latency) // self.period]
+
+    def _ideal(self, ideal: IdealReading) -> Signal:
+        signal = ideal[self._field]
+        return (signal,) if self._is_scalar else signal
+
+    def _joined(self, signal: Signal, older: Sequence[Signal]) -> Signal:
+        """Return the signal whose second half is as old as the skew."""
+        if not older:
+            return signal
+        late = older[-1]
+        half = len(signal) // 2
+        if type(signal) is np.ndarray:
+            return np.concatenate([signal[:half], late[half:]])
+        return [*signal[:half], *late[half:]]
+
+
+def all_draws(parts: Iterable[Any]) -> dict[int, int]:
+    """Put together the `draws` of sensors and stages."""
+    return {stream: width for part in parts for stream, width in part.draws.items()}

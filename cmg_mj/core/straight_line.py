@@ -75,7 +75,8 @@ class _Recorder:
     def __init__(self) -> None:
         self.tape = Tape()
         self.lines: list[str] = []
-        self.known: dict[str, Any] = {**vars(math), "new": tuple.__new__, "with_more": _with_more}
+        self.endings: list[str] = []
+        self.known: dict[str, Any] = {**vars(math), "new": tuple.__new__}
         self._inputs = 0
         self._draws: dict[tuple[Any, str], Sequence[Symbol]] = {}
 
@@ -151,13 +152,21 @@ class _Recorder:
         if type(tree) is tuple:
             return whole
         kind = self._constant(type(tree))
-        if more := getattr(tree, "__dict__", {}):
-            values = ", ".join(f"{key!r}: {self.printed(value, texts)}" for key, value in more.items())
-            return f"with_more({kind}, {whole}, {{{values}}})"
-        return f"new({kind}, {whole})"
+        more = getattr(tree, "__dict__", {})
+        if not more:
+            return f"new({kind}, {whole})"
+        name = self._name("m")
+        self.endings.append(f"{name} = new({kind}, {whole})")
+        self.endings += [f"{name}.{key} = {self.printed(value, texts)}" for key, value in more.items()]
+        return name
 
 
-def straight_line(function: Callable[..., Any], trees: Sequence[Any], tables: Tables) -> Callable[..., Any]:
+def straight_line(
+    function: Callable[..., Any],
+    trees: Sequence[Any],
+    tables: Tables,
+    finite: Callable[[Any], Sequence[Any]] | None = None,
+) -> Callable[..., Any]:
     """Record a pure function and return it as straight-line Python.
 
     The result takes trees of the same form as the given ones, with other numbers, and other tables. It raises
@@ -168,6 +177,8 @@ def straight_line(function: Callable[..., Any], trees: Sequence[Any], tables: Ta
             at every call, but for looking up at them and counting on.
         trees: Arguments to record it with: floats and whole numbers in tuples and lists.
         tables: Tables to record it with.
+        finite: Selects the numbers of its result that must be finite: the straight line raises `ArithmeticError` where
+            one is not.
 
     Returns:
         The function.
@@ -182,7 +193,10 @@ def straight_line(function: Callable[..., Any], trees: Sequence[Any], tables: Ta
     texts, body = _operations(recorder.tape, places)
     names = [f"a{i}" for i in range(len(trees))]
     unpacked = [f"{pattern} = {name}" for pattern, name in zip(patterns, names, strict=True)]
-    lines = [*unpacked, *_ordered(recorder.lines), *body, f"return {recorder.printed(result, texts)}"]
+    checked = [texts[symbol.place] for symbol in _symbols(finite(result) if finite else ())]
+    check = [f"if not abs({' + '.join(checked)}) < inf: raise ArithmeticError"] if checked else []
+    returned = recorder.printed(result, texts)
+    lines = [*unpacked, *_ordered(recorder.lines), *body, *check, *recorder.endings, f"return {returned}"]
     source = f"def run({', '.join(names)}, tables):\n" + "".join(f"    {line}\n" for line in lines)
     exec(compile(source, f"<{function.__qualname__}, printed>", "exec"), recorder.known)
     return recorder.known["run"]
@@ -228,10 +242,3 @@ def _operations(tape: Tape, results: Sequence[int]) -> tuple[dict[int, str], lis
 def _literal(value: float) -> str:
     text = repr(float(value))
     return f"({text})" if text.startswith("-") else text
-
-
-def _with_more(kind: type, parts: tuple, more: Mapping[str, Any]) -> Any:
-    """Make a named tuple that has attributes beside its fields."""
-    made = tuple.__new__(kind, parts)
-    made.__dict__.update(more)
-    return made

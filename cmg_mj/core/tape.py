@@ -9,6 +9,7 @@ raises `InputError` with the line of the user's file.
 from __future__ import annotations
 
 import linecache
+import math
 import os
 import sys
 import traceback
@@ -30,11 +31,14 @@ RECORDED = frozenset(
     """
     absolute add subtract multiply divide negative sign maximum minimum power float_power copysign
     sqrt exp expm1 log log1p sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 hypot floor ceil rint fmod
-    less less_equal greater greater_equal equal not_equal logical_and logical_or logical_not bitwise_and bitwise_or invert
+    less less_equal greater greater_equal equal not_equal
+    logical_and logical_or logical_not bitwise_and bitwise_or invert
     """.split()  # noqa: SIM905
 )
 """NumPy's functions that a tape takes, beside `where`, `clip`, `square` and `positive`."""
 
+NO_LIMIT = {"maximum": -math.inf, "minimum": math.inf}
+"""Limits that no number reaches."""
 INPUT, CONSTANT, CHOICE = "input", "constant", "where"
 """Names of operations that are no function of NumPy's; of a choice the arguments are condition, yes, no."""
 
@@ -70,7 +74,7 @@ class Tape:
 
     def record(self, name: str, *arguments: Operand) -> Symbol:
         """Append an operation on numbers."""
-        places = tuple(self.place(argument) for argument in arguments)
+        places = tuple(map(self.place, arguments))
         return Symbol(self, self._append(Operation(name, places)))
 
     def place(self, number: Operand) -> int:
@@ -79,11 +83,11 @@ class Tape:
         Raises:
             InputError: It is neither.
         """
-        if isinstance(number, np.ndarray) and number.ndim == 0:
-            number = number[()]
-        if isinstance(number, Symbol):
+        if type(number) is Symbol:
             return number.place
-        if isinstance(number, (bool, int, float, np.bool_, np.integer, np.floating)):
+        if isinstance(number, np.ndarray) and number.ndim == 0:
+            return self.place(number[()])
+        if type(number) in (bool, int, float) or isinstance(number, (np.bool_, np.integer, np.floating)):
             return self._append(Operation(CONSTANT, value=float(number)))
         raise InputError(f"{type(number).__name__} where a real number belongs {here()}")
 
@@ -110,7 +114,8 @@ class Tape:
         return uses
 
     def _append(self, operation: Operation) -> int:
-        key = operation.name, operation.arguments, repr(operation.value)  # 0.0 and -0.0 differ
+        value = operation.value
+        key = operation if value is None else (operation.name, repr(value))  # 0.0 and -0.0 differ
         place = self._places.get(key)
         if place is None:
             place = self._places[key] = len(self.operations)
@@ -198,6 +203,8 @@ def _applied(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
         raise InputError(f"numpy.{name} {here()}: it is not among the functions that can be exported")
     if name in ("maximum", "minimum") and not isinstance(inputs[0], Symbol):
         inputs = inputs[::-1]  # the operand that may be NaN comes first: `{1} if {0} < {1} else {0}` keeps it
+    if type(inputs[-1]) is float and inputs[-1] == NO_LIMIT.get(name):
+        return Symbol(tape, tape.place(inputs[0]))
     return tape.record(name, *inputs)
 
 

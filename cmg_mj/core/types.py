@@ -46,6 +46,9 @@ class Measurement(_Angles):
         return y
 
 
+STATE_NAMES = ("x1", "x2", "x3")
+
+
 class Estimate(NamedTuple):
     """An observer's estimate of x at the sample it was given."""
 
@@ -100,6 +103,12 @@ BIAS = "bias_rad"
 """The extra signal of an observer that estimates e, the equilibrium bias [rad]."""
 TORQUE = "torque_n_m"
 """The extra signal of an observer that estimates a tilting torque on the whole rig [N m]."""
+
+
+def as_estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
+    """Give an estimate of x alone its parts' names; a longer one is a plain tuple."""
+    return Estimate(*parts) if len(parts) == len(STATE_NAMES) else tuple(parts)
+
 
 STATE_SIGNALS = ("x1_rad", "x2_rad_s", "x3_rad")
 """The state's signals, which every observer estimates; those that it estimates beyond x come after them."""
@@ -217,7 +226,7 @@ Forces = Sequence[Scalar] | np.ndarray
 """Specific force: inner x, inner z, outer x, outer z [m/s^2]; floats, or one array (4, n_worlds)."""
 
 
-Setpoints = tuple[Sequence[int], np.ndarray]
+Setpoints = tuple[Sequence[int], Any]
 """Numbers of actuators that are no gimbal's and no flywheel's, and their controls, (n,) or (n, n_worlds)."""
 
 

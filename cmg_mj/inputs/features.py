@@ -42,7 +42,7 @@ class Feature(NamedTuple):
     disturbance: str = ""
     """Makes what acts from outside: (sections, plants, seed, worlds) -> Disturbance."""
     between: str = ""
-    """Makes the stage between the axes: (section, plant) -> (first controller) -> stage."""
+    """Makes the stage between the axes: (section, plant, controls of the axes) -> AxesStage, or None."""
     in_world: str = ""
     """Makes the plant of a world: (section, plant, seed, world) -> plant."""
     figures: str = ""

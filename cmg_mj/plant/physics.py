@@ -5,14 +5,16 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Tick
-from cmg_mj.core.loop import Acceleration, Joints, Reading, State
+from cmg_mj.core.axis import Tick
+from cmg_mj.core.loop import Acceleration, Joints, State
+from cmg_mj.core.rig import Readings
 from cmg_mj.plant.plant import Plant
 from cmg_mj.plant.tilt_line import apply_torques
 
@@ -41,7 +43,7 @@ class OneWorld:
         """Read joint angles and rates as floats."""
         return self._qpos.tolist(), self._qvel.tolist()
 
-    def reading(self, v: Joints) -> Reading:
+    def reading(self, v: Joints) -> Readings:
         """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         self._forward()
         return self._ideal(self._sensordata.tolist(), v)
@@ -52,7 +54,7 @@ class OneWorld:
         for servo, direction in self._servos[axis]:
             ctrl[servo] = direction * u
 
-    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+    def control(self, actuators: Sequence[int], setpoints: Any) -> None:
         """Set the controls of other actuators."""
         self._ctrl[actuators] = setpoints
 
@@ -120,7 +122,7 @@ class ManyWorlds:
         """Copy joint angles and rates, each (n, n_worlds)."""
         return self._qpos.T.copy(), self._qvel.T.copy()
 
-    def reading(self, v: Joints) -> Reading:
+    def reading(self, v: Joints) -> Readings:
         """Compute what perfect sensors show at the present state, with the torques and commands that hold there."""
         try:
             self.batch.forward(None if self._all_running else self.running)
@@ -132,9 +134,9 @@ class ManyWorlds:
         """Set the gimbal rates of an axis, each module in its direction [rad/s]."""
         self._ctrl[:, self._servos[axis]] = np.multiply.outer(u, self._directions[axis])
 
-    def control(self, actuators: Sequence[int], setpoints: np.ndarray) -> None:
+    def control(self, actuators: Sequence[int], setpoints: Any) -> None:
         """Set the controls of other actuators, one for all worlds or (n, n_worlds)."""
-        self._ctrl[:, actuators] = setpoints.T
+        self._ctrl[:, actuators] = np.transpose(setpoints)
 
     def power(self) -> np.ndarray:
         """Return the power of each actuator at the last physics step, (n, n_worlds) [W]."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import KnownPlant
+from cmg_mj.core.axis import KnownPlant
 from cmg_mj.core.errors import InputError, TomlValue, nearest
 from cmg_mj.core.loop import Joints
 from cmg_mj.core.reduced_model import ReducedModel
@@ -38,7 +38,7 @@ from cmg_mj.scenario.plant_settings import MIN_STEP_S, PlantSettings
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.scenario.time_grid import TimeGrid
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.stages.backlash import ARCMIN_A_DEGREE, backlash
+from cmg_mj.stages.backlash import ARCMIN_A_DEGREE
 
 if TYPE_CHECKING:
     from cmg_mj.stages.turning import YawCoupling
@@ -248,7 +248,7 @@ class Plant:
         """The plant as a controller of the axis knows it."""
         zeros = tuple(module.gimbal_zero for module in self.axis.modules)
         gimbal_angle = GimbalAngle(tuple(self.axis.directions), zeros)
-        return KnownPlant(self.pair_tilt, gimbal_angle, self.model.opt.timestep, backlash(self.backlash))
+        return KnownPlant(self.pair_tilt, gimbal_angle, self.model.opt.timestep, self.backlash)
 
     @property
     def timestep(self) -> float:

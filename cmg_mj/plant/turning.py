@@ -37,7 +37,7 @@ def turning(model: mujoco.MjModel, key: int, axes: Sequence[Axis]) -> YawCouplin
         for n, push, about in rows
     ]
     coriolis = [[2.0 * (n @ np.cross(UP, m)) for m in along] for n, _, _ in rows]
-    return YawCoupling(np.array(wheels), np.array(body), np.array(coriolis))
+    return YawCoupling(*(np.array(rows).tolist() for rows in (wheels, body, coriolis)))
 
 
 def _turned(model: mujoco.MjModel, data: mujoco.MjData, module: Module) -> np.ndarray:

@@ -9,14 +9,14 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from cmg_mj.core.axes import ControllerLike
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.plant.plant import Plant
 
 
-def control(plant: Plant, controller: ControllerLike, data: mujoco.MjData) -> bool:
+def control(plant: Plant, controller: Controller, data: mujoco.MjData) -> bool:
     """Sample what is due at this physics step, and set the servos' commands if it is a control tick.
 
     Call it before every `mujoco.mj_step`, after the torques from outside have been set. Where something is due it runs
@@ -43,7 +43,7 @@ def _forward(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return data.sensordata
 
 
-def _tick(plant: Plant, controller: ControllerLike, data: mujoco.MjData, sense: Callable[[], np.ndarray]) -> bool:
+def _tick(plant: Plant, controller: Controller, data: mujoco.MjData, sense: Callable[[], np.ndarray]) -> bool:
     """Sample what is due, from sensordata as `sense` gives it, and set the servos if it is a control tick."""
     step = round(data.time / plant.model.opt.timestep)
     if step % controller.steps_per_sample:
@@ -64,13 +64,12 @@ def _tick(plant: Plant, controller: ControllerLike, data: mujoco.MjData, sense: 
     return True
 
 
-def _hold(plant: Plant, controller: ControllerLike, data: mujoco.MjData) -> None:
+def _hold(plant: Plant, controller: Controller, data: mujoco.MjData) -> None:
     """Set the servos' commands to those of the last tick."""
-    for axis, part in zip(plant.axes, controller.axes, strict=True):
-        if part.gimbal_rate is not None:
-            for module in axis.modules:
-                data.ctrl[module.servo] = module.direction * part.gimbal_rate
-    if controller.setpoints is not None:
+    for axis, rate in zip(plant.axes, controller.gimbal_rates, strict=False):  # before the first tick there are none
+        for module in axis.modules:
+            data.ctrl[module.servo] = module.direction * rate
+    if controller.moves_others and controller.tick is not None:
         actuators, controls = controller.setpoints
         data.ctrl[actuators] = controls
 
@@ -90,7 +89,7 @@ class ControlCallback:
         controller: Its controller.
     """
 
-    def __init__(self, plant: Plant, controller: ControllerLike) -> None:
+    def __init__(self, plant: Plant, controller: Controller) -> None:
         self.plant = plant
         self.controller = controller
         self._scratch = mujoco.MjData(plant.model)
@@ -146,7 +145,7 @@ class CallbackLoop(ControlLoop):
 
 
 @contextmanager
-def control_callback(plant: Plant, controller: ControllerLike) -> Iterator[ControlCallback]:
+def control_callback(plant: Plant, controller: Controller) -> Iterator[ControlCallback]:
     """Install the controller as MuJoCo's control callback, and take it out again even on an exception.
 
     `mjcb_control` is one pointer for the whole process: while it is installed, only this plant may be stepped.

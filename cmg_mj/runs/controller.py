@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Unpack
 
-from cmg_mj.core.axes import MultiAxisController
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.laws import Law, StateFeedback
 from cmg_mj.observers import Observer
 from cmg_mj.plant.plant import Plant
-from cmg_mj.scenario.design import Design, StageOptions, make_controller
+from cmg_mj.scenario.design import AxisOptions, Design, make_axis
 from cmg_mj.scenario.schema import ObserverSettings, Scenario
 from cmg_mj.sensors import Sensors
 from cmg_mj.stages.turning import compensation
@@ -23,8 +23,10 @@ def controller(
     *,
     law: Law | None = None,
     sensors: Sensors | None = None,
-    **options: Unpack[StageOptions],
-) -> Any:
+    seed: int = 0,
+    world_ids: int | Sequence[int] = 0,
+    **options: Unpack[AxisOptions],
+) -> Controller:
     """Make a fresh controller for a plant; of several axes one an axis, which compensate a turn about the vertical.
 
     Args:
@@ -33,10 +35,12 @@ def controller(
             parameters, such as {"kind": "homogeneous", "k1": 20.0}.
         law: The law, an object; by default Table 2's gains at 200 Hz. `Experiment.law` is a scenario's.
         sensors: The sensors; by default those of the datasheets.
-        **options: Options of `Controller`, such as seed and feedback.
+        seed: Seed of the sensors' noise.
+        world_ids: The number of one world, on floats, or the numbers of many, on arrays.
+        **options: See `AxisOptions`, such as feedback.
 
     Returns:
-        A `Controller`; of several axes a `MultiAxisController`.
+        The controller.
 
     Raises:
         InputError: The observer does not exist or refuses a parameter, the law is a name, or a rate does not fit the
@@ -49,7 +53,7 @@ def controller(
         )
     sensors, papers = sensors or Sensors(), law is None
     law = law or StateFeedback(dt=0.005)
-    controllers = []
+    controls = []
     for i, name in enumerate(plant.axis_names):
         part, made = plant.single_axis(name), observer
         if papers:
@@ -57,11 +61,11 @@ def controller(
         if isinstance(made, (str, Mapping)):
             settings = ObserverSettings(**({"kind": made} if isinstance(made, str) else made))
             made = settings.make(law.dt, part.reduced, part.parameters.noise(sensors))
-        own: StageOptions = {**options, "axis": i} if len(plant.axes) > 1 else options
-        controllers.append(make_controller(made, law, sensors, part.interface, **own))
-    if len(controllers) == 1:
-        return controllers[0]
-    return MultiAxisController(controllers, compensation(plant.turning, sensors.mems_gyro))
+        own: AxisOptions = {**options, "axis": i} if len(plant.axes) > 1 else options
+        controls.append(make_axis(made, law, sensors, part.interface, **own))
+    gyro = sensors.mems_gyro.turn_gyro(law.dt)
+    between = [compensation(plant.turning, gyro, controls)] if len(controls) > 1 else []
+    return Controller(controls, between, seed=seed, world_ids=world_ids)
 
 
 def _hint(design: Design) -> None:

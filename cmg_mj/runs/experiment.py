@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 import pkgutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 import tomli_w
 
-from cmg_mj.core.axes import ControllerLike, MultiAxisController
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped, nearest, shown
 from cmg_mj.core.loop import ControlLoop
+from cmg_mj.core.rig import AxesStage
 from cmg_mj.core.sensor import whole_steps
 from cmg_mj.inputs.features import DRIVERS, entries
 from cmg_mj.inputs.overrides import assign
@@ -46,10 +47,50 @@ from cmg_mj.scenario.design import Design, design
 from cmg_mj.scenario.resolve import differences, resolved
 from cmg_mj.scenario.schema import Scenario, parse_scenario
 from cmg_mj.scenario.time_grid import time_grid
-from cmg_mj.stages.backlash import backlash
 
 if TYPE_CHECKING:
     import control
+
+
+@dataclasses.dataclass(frozen=True)
+class ExperimentAxis:
+    """One axis of an experiment.
+
+    Attributes:
+        plant: The rig as this axis sees it.
+        design: The law and the observers, of the scenario of this axis.
+    """
+
+    plant: Plant
+    design: Design
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with what this axis has of its own."""
+        return self.design.scenario
+
+    @property
+    def name(self) -> str:
+        """The axis' name; of a rig's only one it may be empty."""
+        return self.plant.axis.name
+
+    @property
+    def law(self) -> Law:
+        """The control law."""
+        return self.design.law
+
+    @property
+    def observer_names(self) -> list[str]:
+        """The observer in the loop, then the open-loop observers."""
+        return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
+
+    @property
+    def hints(self) -> list[str]:
+        """Clauses on what is no mistake and yet likely to make the plant fall."""
+        from cmg_mj.linear.verdict import hints  # no run needs it
+
+        judgements = [judge(self.design, self.plant) for judge in entries("judge").values()]
+        return [*hints(self.design, self.plant), *(hint for judged in judgements for hint in judged.hints)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,18 +100,21 @@ class Experiment:
     Attributes:
         scenario: What it was made from.
         plant: The rig.
-        design: The law and the observers; of several axes the first one's.
-        several: One an axis, if the rig has several, or if the scenario says of an axis what it has of its own.
+        axes: The axes, one or more.
     """
 
     scenario: Scenario
     plant: Plant
-    design: Design
-    several: tuple[Experiment, ...] = ()
+    axes: tuple[ExperimentAxis, ...]
+
+    @property
+    def design(self) -> Design:
+        """The law and the observers, of several axes the first one's."""
+        return self.axes[0].design
 
     @property
     def law(self) -> Law:
-        """The control law."""
+        """The control law, of several axes the first one's."""
         return self.design.law
 
     @property
@@ -79,63 +123,42 @@ class Experiment:
         kinds = [part.scenario.observer.kind for part in self.axes]
         if len(set(kinds)) == 1:
             return kinds[0]
-        return ", ".join(f"{part.plant.axis.name} {kind}" for part, kind in zip(self.axes, kinds, strict=True))
+        return ", ".join(f"{part.name} {kind}" for part, kind in zip(self.axes, kinds, strict=True))
 
     @property
     def observer_names(self) -> list[str]:
         """The observer in the loop, then the open-loop observers; of several axes the first one's."""
-        first = self.axes[0].scenario
-        return [first.observer.kind, *first.open_loop_names()]
+        return self.axes[0].observer_names
 
-    def controller(self, world_ids: int | Sequence[int] = 0) -> ControllerLike:
+    def controller(self, world_ids: int | Sequence[int] = 0, observer: Observer | None = None) -> Controller:
         """Make a fresh controller.
 
         Args:
             world_ids: The number of one world, or the numbers of many: their noise depends on (seed, number) alone.
-
-        Returns:
-            The controller; of several axes a `MultiAxisController`.
-        """
-        return self.join_axes(
-            [
-                part.design.controller(part.plant.interface, world_ids=world_ids, axis=i)
-                for i, part in enumerate(self.axes)
-            ]
-        )
-
-    def axis_controller(
-        self,
-        world_ids: int | Sequence[int] = 0,
-        observer: Observer | None = None,
-        make: Callable[..., Controller] = Controller,
-    ) -> Controller:
-        """Make a fresh controller of the only axis.
-
-        Args:
-            world_ids: The number of one world, or the numbers of many.
-            observer: Instead of the scenario's.
-            make: Makes a controller of another kind: see `make_controller`.
+            observer: Instead of the scenario's, on all axes.
 
         Returns:
             The controller.
-
-        Raises:
-            InputError: The plant has several axes.
         """
-        part = self.require_single_axis("one controller")
-        return part.design.controller(part.plant.interface, world_ids=world_ids, observer=observer, make=make)
+        controls = [
+            part.design.axis_control(part.plant.interface, axis=i, observer=observer)
+            for i, part in enumerate(self.axes)
+        ]
+        return Controller(controls, self.between(controls), seed=self.scenario.seed, world_ids=world_ids)
 
-    def join_axes(self, controllers: Sequence[Controller]) -> ControllerLike:
-        """Join the controllers of the axes; of one axis its controller itself."""
-        if len(controllers) == 1:
-            return controllers[0]
-        from cmg_mj.stages.turning import compensation  # most rigs have one axis
+    def between(self, controls: Sequence[AxisControl]) -> list[AxesStage]:
+        """Make the stages between the axes, from the controls of the axes; none for a single one."""
+        if len(controls) == 1:
+            return []
+        makers = entries("between").items()
+        made = (make(self.scenario.section(name), self.plant, controls) for name, make in makers)
+        stages = [stage for stage in made if stage is not None]
+        if self.scenario.controller.compensate_turning:
+            from cmg_mj.stages.turning import compensation  # most rigs have one axis
 
-        compensates = self.scenario.controller.compensate_turning
-        between = compensation(self.plant.turning, self.scenario.sensors.mems_gyro) if compensates else None
-        for name, make in entries("between").items():
-            between = make(self.scenario.section(name), self.plant) or between
-        return MultiAxisController(controllers, between)
+            gyro = self.scenario.sensors.mems_gyro.turn_gyro(controls[0].law.dt)
+            stages.append(compensation(self.plant.turning, gyro, controls))
+        return stages
 
     def run(self, driver: str = "native", world: int = 0, **options: Unpack[SimulationOptions]) -> Result:
         """Run one world. Options are those of `simulate`.
@@ -189,14 +212,14 @@ class Experiment:
     @functools.cached_property
     def batch_key(self) -> BatchKey:
         """Key that its worlds share with all worlds that may run in one batch with them."""
-        prefixes = [f"axes.{axis.plant.axis.name}." for axis in self.several] or [""]
+        prefixes = [f"axes.{part.name}." for part in self.axes] if self._names_axes else [""]
         of_axes = [key_parts(part.scenario, part.design, name) for part, name in zip(self.axes, prefixes, strict=True)]
         return ("the plant's structure", False, plant_structure(self.plant)), *itertools.chain(*of_axes)
 
     @property
-    def axes(self) -> tuple[Experiment, ...]:
-        """One an axis."""
-        return self.several or (self,)
+    def _names_axes(self) -> bool:
+        """Whether its axes have names that a scenario can use."""
+        return len(self.axes) > 1 or bool(self.scenario.axes)
 
     def with_varied(self, settings: Mapping[str, Sequence[Any] | np.ndarray]) -> list[Experiment]:
         """Return the scenario with other settings in each world; worlds with equal settings share one.
@@ -248,7 +271,7 @@ class Experiment:
     def simulate(
         self,
         plant: Plant | Sequence[Plant],
-        controller: ControllerLike,
+        controller: Controller,
         outside: Outsides | None = None,
         driver: str = "native",
         loop: type[ControlLoop] = ControlLoop,
@@ -287,14 +310,14 @@ class Experiment:
         recorders = {
             name: TickRecorder(
                 [rig.single_axis(name) for rig in plants],
-                axis.observer_names,
-                part,
+                self.axes[i].observer_names,
+                controller,
+                i,
                 outside,
                 settings,
                 keep=keep,
-                joints=axis is self.axes[0],
             )
-            for name, axis, part in zip(plants[0].axis_names, self.axes, controller.axes, strict=True)
+            for i, name in enumerate(plants[0].axis_names)
         }
 
         def since(tick: int) -> Trajectory:
@@ -351,19 +374,19 @@ class Experiment:
             driver,
         )
 
-    def require_single_axis(self, what: str) -> Experiment:
-        """Return the experiment of the only axis, and refuse a plant of several.
+    def require_single_axis(self, what: str) -> ExperimentAxis:
+        """Return the only axis, and refuse a plant of several.
 
         Args:
             what: The operation that takes one axis, for the message.
 
         Returns:
-            The experiment of that axis.
+            The axis.
 
         Raises:
             InputError: The rig has several.
         """
-        if len(self.several) > 1:
+        if len(self.axes) > 1:
             names = self.plant.axis_names
             several = f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one"
             if not isinstance(self.plant.axes[-1].line, HingeLine):
@@ -419,17 +442,16 @@ class Experiment:
 
     @property
     def hints(self) -> list[str]:
-        """Clauses on what is no mistake and yet likely to make the plant fall."""
-        from cmg_mj.linear.verdict import hints  # as above
-
-        if not self.several:
-            judgements = [judge(self.design, self.plant) for judge in entries("judge").values()]
-            return [*hints(self.design, self.plant), *(hint for judged in judgements for hint in judged.hints)]
-        return [f"{part.plant.axis.name}: {hint}" for part in self.several for hint in part.hints]
+        """Clauses on what is no mistake and yet likely to make the plant fall; what holds for all axes once."""
+        said: dict[str, list[str]] = {}
+        for part in self.axes:
+            for hint in part.hints:
+                said.setdefault(hint, []).append(part.name)
+        return [hint if len(names) == len(self.axes) else f"{', '.join(names)}: {hint}" for hint, names in said.items()]
 
     def resolved(self) -> dict[str, Any]:
         """Return the scenario with every default written out, and the versions it ran with, as TOML can hold it."""
-        return resolved(self.scenario, {part.plant.axis.name: part.design for part in self.axes})
+        return resolved(self.scenario, {part.name: part.design for part in self.axes})
 
     @functools.cached_property
     def differences(self) -> dict[str, Any]:
@@ -502,9 +524,8 @@ def prepare(scenario: Scenario, plant: Plant | None = None, like: Plant | None =
                     f"sensors.accelerometer.averaged = true: {rig.path} has no sensors accelerometer_inner_velocity, "
                     "accelerometer_inner_x and so on, which show means; leave it out"
                 )
-            axes.append(Experiment(part, rig, design(part, rig.parameters)))
-    first = axes[0]
-    return first if first.scenario is scenario else Experiment(scenario, plant, first.design, tuple(axes))
+            axes.append(ExperimentAxis(rig, design(part, rig.parameters)))
+    return Experiment(scenario, plant, tuple(axes))
 
 
 def run_batch(
@@ -547,21 +568,21 @@ def run_batch(
                 f"run_many: {words} differs, which worlds of one batch must have in common; call run_many once for "
                 "each value"
             )
-    controllers, outside = [], outsides(first.scenario)
+    controls, outside = [], outsides(first.scenario)
     for i, part in enumerate(first.axes):
         parts = [experiment.axes[i] for experiment in experiments]
         law, sensors, outside = batched([(one.design.fresh_law(), one.scenario) for one in parts])
         tilt = stack_worlds([plant.axes[i].pair_tilt for plant in plants])
-        servos = backlash(stack_worlds([plant.backlash for plant in plants]))
-        controllers.append(
-            part.design.controller(
-                part.plant.interface._replace(tilt=tilt, servos=servos),
-                world_ids=world_ids,
+        gap = stack_worlds([plant.backlash for plant in plants])
+        controls.append(
+            part.design.axis_control(
+                part.plant.interface._replace(tilt=tilt, backlash=gap),
                 axis=i,
                 observer=observer,
-                open_loop_observers=batched_open_loop_observers([one.design for one in parts]),
+                open_loop_observers=list(batched_open_loop_observers([one.design for one in parts]).values()),
                 law=law,
                 sensors=sensors,
             )
         )
-    return first.simulate(plants, first.join_axes(controllers), outside, **options)
+    controller = Controller(controls, first.between(controls), seed=first.scenario.seed, world_ids=world_ids)
+    return first.simulate(plants, controller, outside, **options)

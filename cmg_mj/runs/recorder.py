@@ -31,10 +31,10 @@ class TickRecorder:
         plants: The rigs, one a world.
         observers: Names of the observer in the loop, then of the open-loop observers.
         controller: The controller whose ticks they are: floats of one world, or arrays (n_worlds,).
+        axis: The number of the axis; the first one keeps the joints too.
         outside: What acts from outside.
         settings: What counts as settled.
         keep: Whether to keep the pieces for a trajectory.
-        joints: Whether to keep the joints.
     """
 
     def __init__(
@@ -42,19 +42,21 @@ class TickRecorder:
         plants: Sequence[Plant],
         observers: Sequence[str],
         controller: Controller,
+        axis: int,
         outside: Outsides,
         settings: MetricsSettings,
         *,
         keep: bool,
-        joints: bool,
     ) -> None:
-        self._axis, self._controller = plants[0].axis, controller
+        self._axis, self._controller, self._number = plants[0].axis, controller, axis
+        control, joints = controller.axes[axis], axis == 0
+        self._reads_gyro = control.reads_gyro
         self._bias = np.array([plant.bias for plant in plants])
         names, kinds = (tuple(plants[0].joint_names), plants[0].joint_kinds) if joints else ((), ())
         self._layout = Layout(
-            tuple(observers), tuple(map(tuple, controller.extra_signals)), names, kinds, controller.reads_gyro
+            tuple(observers), tuple(map(tuple, control.extra_signals)), names, kinds, control.reads_gyro
         )
-        dt, sensors = controller.law.dt, controller.sensors
+        dt, sensors = control.law.dt, control.sensors
         self._keep, self._joints, self._dt = keep, joints, dt
         self._single = isinstance(controller.world_ids, int)
         self._waiting: list[tuple] = []
@@ -74,7 +76,7 @@ class TickRecorder:
             len(plants),
             dt,
             outside.get("push", ()),
-            controller.law.rate_limit,
+            control.law.rate_limit,
             settings,
             [plant.apparent_bias(sensor.accelerometer) for plant, sensor in pairs],
             rates,
@@ -83,12 +85,10 @@ class TickRecorder:
         )
         # A sample of y1 that the controller sees at n ticks counts n times, with sqrt(n) times the noise each time.
         sigmas = [noise.tilt * math.sqrt(y1_period / dt) for noise in noises]
-        self._references = Baselines(
-            sensors.mems_gyro, dt, controller.seed, controller.world_ids, sigmas, controller.axis
-        )
+        self._references = Baselines(sensors.mems_gyro, dt, controller.seed, controller.world_ids, sigmas, axis)
 
     def add(self, q: Joints, v: Joints, torque: Scalar, running: np.ndarray | None) -> None:
-        """Take the controller's latest tick.
+        """Take the controller's latest tick of the axis.
 
         Args:
             q: Joint angles at the tick [rad].
@@ -96,10 +96,10 @@ class TickRecorder:
             torque: The push, a float, or (n_worlds,) [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
-        body_rate = self._controller.body_rate
+        body_rate = self._controller.body_rate(self._number)
         if not self._single:  # a row of all sensors' readings, which would be held as long
             body_rate = body_rate.copy()
-        self._waiting.append((q, v, self._controller.tick, body_rate, torque, running))
+        self._waiting.append((q, v, self._controller.ticks[self._number], body_rate, torque, running))
         if len(self._waiting) >= TICKS_A_PIECE:
             self.flush()
 
@@ -126,7 +126,7 @@ class TickRecorder:
         estimated = chain.from_iterable(self._columns(estimate) for estimate in zip(*estimates, strict=True))
         line = self._axis.line
         true = line.lean(q) + self._bias, line.rate(v), self._axis.gimbal_angle(q)
-        readings = [np.array(gyro).reshape(shape)] if self._controller.reads_gyro else []
+        readings = [np.array(gyro).reshape(shape)] if self._reads_gyro else []
         signals = [*true, *measured, push, *readings, *estimated, *([*q, *v] if self._joints else [])]
         if not self._single:
             ended = ~np.array(runnings)

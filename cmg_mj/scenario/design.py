@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, TypedDict, Unpack
+from typing import Any, NamedTuple, TypedDict, Unpack
 
-from cmg_mj.core.controller import AngleSource, Controller, Feedback, KnownPlant
+from cmg_mj.core.axis import AngleSource, AxisControl, Feedback, KnownPlant
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.sensor import whole_steps
 from cmg_mj.core.tilt import MeasurementNoise, PairTilt
-from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs
+from cmg_mj.core.types import LAW_NEEDS, extra_signals, law_needs, reads_gyro
 from cmg_mj.laws import LAW_CLASSES, LAWS, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Observer, make_observer
 from cmg_mj.scenario.schema import ControllerSettings, Scenario
 from cmg_mj.sensors import Sensors
+from cmg_mj.stages.backlash import backlash
 from cmg_mj.stages.notch import notches
 from cmg_mj.stages.trim import trims
 
@@ -57,52 +60,54 @@ class Design:
         """Make the open-loop observers, by name."""
         return {name: make_observer(name, *self.constructor_arguments) for name in self.scenario.open_loop_names()}
 
-    def controller(
+    def axis_control(
         self,
         plant: KnownPlant,
         *,
-        world_ids: int | Sequence[int] = 0,
         axis: int = 0,
-        make: Callable[..., Controller] = Controller,
         observer: Observer | None = None,
-        open_loop_observers: Mapping[str, Observer] | None = None,
+        open_loop_observers: Sequence[Observer] | None = None,
         law: Law | None = None,
         sensors: Sensors | None = None,
-    ) -> Controller:
-        """Make a fresh controller.
+    ) -> AxisControl:
+        """Make the control of an axis.
 
         Args:
             plant: The controller's knowledge of the plant.
-            world_ids: The number of one world, or the numbers of many.
             axis: The number of the plant's axis.
-            make: See `make_controller`.
             observer: Instead of the scenario's, as are the next three.
-            open_loop_observers: The open-loop observers, by name.
+            open_loop_observers: The open-loop observers.
             law: The control law.
             sensors: The sensors.
 
         Returns:
-            The controller.
+            The control.
 
         Raises:
             InputError: A rate does not fit the physics step.
         """
         settings = self.scenario.controller
-        return make_controller(
+        if open_loop_observers is None:
+            open_loop_observers = list(self.open_loop_observers().values())
+        return make_axis(
             observer or self.observer(),
             law or self.fresh_law(),
             sensors or self.scenario.sensors,
             plant,
-            make,
-            seed=self.scenario.seed,
-            world_ids=world_ids,
             feedback=settings.feedback,
             angle_source=settings.angle_source,
             bias_trim_s=settings.bias_trim_s,
             notch_hz=settings.notch_hz,
-            open_loop_observers=self.open_loop_observers() if open_loop_observers is None else open_loop_observers,
+            open_loop_observers=open_loop_observers,
             axis=axis,
         )
+
+    def controller(self, plant: KnownPlant, world_ids: int | Sequence[int] = 0, **options: Any) -> Controller:
+        """Make a fresh controller of this axis alone: the number of one world, or the numbers of many.
+
+        Options are those of `axis_control`.
+        """
+        return Controller([self.axis_control(plant, **options)], seed=self.scenario.seed, world_ids=world_ids)
 
 
 def design(scenario: Scenario, rig: PlantNumbers) -> Design:
@@ -192,48 +197,56 @@ class PlantNumbers(NamedTuple):
         )
 
 
-class StageOptions(TypedDict, total=False):
-    """Keyword arguments of `Controller` that are a user's choice, and settings of its stages."""
+class AxisOptions(TypedDict, total=False):
+    """Keyword arguments of `make_axis`: a user's choice, and settings of the stages."""
 
-    seed: int
-    world_ids: int | Sequence[int]
     feedback: Feedback
     angle_source: AngleSource
-    open_loop_observers: Mapping[str, Observer] | None
+    open_loop_observers: Sequence[Observer]
+    """Observers that run open loop."""
     axis: int
+    """The number of the rig's axis, on which the noise depends."""
     bias_trim_s: float
     """For so long from the start, the integrator is held where the observer's bias estimate asks for it [s]."""
     notch_hz: float
     """The middle of a notch on the law's command; 0: none [Hz]."""
 
 
-def make_controller(
-    observer: Observer,
-    law: Law,
-    sensors: Sensors,
-    plant: KnownPlant,
-    make: Callable[..., Controller] = Controller,
-    **options: Unpack[StageOptions],
-) -> Controller:
-    """Make a fresh controller of one axis.
+def make_axis(
+    observer: Observer, law: Law, sensors: Sensors, plant: KnownPlant, **options: Unpack[AxisOptions]
+) -> AxisControl:
+    """Make the control of one axis.
 
     Args:
         observer: The observer in the loop.
-        law: The control law.
+        law: The control law; its `dt` is the control period.
         sensors: The sensors between the ideal readings and the controller.
         plant: The controller's knowledge of the plant.
-        make: Makes it of observer, law, sensors, plant and options: a controller of another kind.
-        **options: Options of `Controller`, and settings of its stages.
+        **options: See `AxisOptions`.
 
     Returns:
-        The controller.
+        The control.
 
     Raises:
         InputError: A rate does not fit the physics step, or an option does not fit the observer or the law.
     """
     for name in options:
-        if name not in StageOptions.__annotations__:
-            raise InputError(f"{name}: no such option; {nearest(name, StageOptions.__annotations__)}")
-    commands = notches(options.pop("notch_hz", 0.0), law)
-    memories = trims(options.pop("bias_trim_s", 0.0), law, extra_signals(observer), plant.timestep)
-    return make(observer, law, sensors, plant, commands=commands, memories=memories, **options)
+        if name not in AxisOptions.__annotations__:
+            raise InputError(f"{name}: no such option; {nearest(name, AxisOptions.__annotations__)}")
+    observers = observer, *options.get("open_loop_observers", ())
+    number = options.get("axis", 0)
+    gyro_period_s = law.dt if reads_gyro(*observers) else None
+    return AxisControl(
+        observers,
+        law,
+        sensors,
+        plant,
+        at_work=sensors.at_work(plant.timestep, number, gyro_period_s),
+        period=whole_steps(law.dt, plant.timestep, "controller.rate_hz", f"{1.0 / law.dt:g} Hz"),
+        commands=tuple(notches(options.get("notch_hz", 0.0), law)),
+        servos=backlash(plant.backlash, law.dt),
+        memories=tuple(trims(options.get("bias_trim_s", 0.0), law, extra_signals(observer), plant.timestep)),
+        feedback=options.get("feedback", "observer"),
+        angle_source=options.get("angle_source", "measured"),
+        number=number,
+    )

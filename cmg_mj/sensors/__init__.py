@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.noise import normals
-from cmg_mj.core.sensor import SampledSensor, Site
+from cmg_mj.core.sensor import Sensor, Site
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 from cmg_mj.sensors.gyros import Fog, MemsGyro
@@ -35,38 +33,22 @@ class Sensors:
         """Return the sensors with another noise density of the accelerometers [ug/sqrt(Hz)]."""
         return replace(self, accelerometer=replace(self.accelerometer, noise_density_ug_rthz=ug_rthz))
 
-    def at_work(
-        self,
-        timestep: float,
-        seed: int,
-        world_ids: int | Sequence[int],
-        axis: int = 0,
-        gyro_period_s: float | None = None,
-    ) -> list[SampledSensor]:
-        """Start the sensors that the controller reads: accelerometers, encoders, fibre-optic gyro, and any cheap one.
+    def at_work(self, timestep: float, axis: int = 0, gyro_period_s: float | None = None) -> tuple[Sensor, ...]:
+        """Make the sensors that the controller reads: accelerometers, encoders, fibre-optic gyro, and any cheap one.
 
         Args:
             timestep: Physics step [s].
-            seed: The run's seed.
-            world_ids: The number of one world, on floats, or the numbers of many, on arrays.
             axis: The number of the axis whose they are: each has noise of its own.
             gyro_period_s: Time between two readings of the cheap gyro; None if no observer needs it [s].
 
         Returns:
-            The sensors, sampled.
+            The sensors.
 
         Raises:
             InputError: A rate or a time does not fit the physics step.
         """
-
-        def site(name: str) -> Site:
-            return Site(
-                f"sensors.{name}",
-                timestep,
-                lambda stream, channels: normals(seed, world_ids, stream.on_axis(axis), channels),
-            )
-
-        started = [getattr(self, name).at_work(site(name)) for name in ("accelerometer", "encoder", "fog")]
+        parts = {"accelerometer": self.accelerometer, "encoder": self.encoder, "fog": self.fog}
+        sensors = [part.at_work(Site(f"sensors.{name}", timestep, axis)) for name, part in parts.items()]
         if gyro_period_s is not None:
-            started.append(self.mems_gyro.at_work(site("mems_gyro"), gyro_period_s))
-        return started
+            sensors.append(self.mems_gyro.at_work(Site("sensors.mems_gyro", timestep, axis), gyro_period_s))
+        return tuple(sensors)

@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.sensor import SampledSensor, Site, shown
+from cmg_mj.core.sensor import Digital, Sensor, Site, steps_until
 from cmg_mj.core.types import STANDARD_GRAVITY, Forces
 from cmg_mj.inputs.types import STRICT, Latency, NonNegative, Rate
 from cmg_mj.stages.flicker import FlickerSettings, flicker
-from cmg_mj.stages.low_pass import LowPass, LowPassSettings
+from cmg_mj.stages.low_pass import LowPassSettings, low_pass
 from cmg_mj.stages.mounting_errors import PERFECT, MountingErrorsSettings, mounting_errors
-from cmg_mj.stages.pair import Averaged, PairSettings, white
-from cmg_mj.stages.skew import Skew, SkewSettings
+from cmg_mj.stages.pair import PairSettings, averaged, white
+from cmg_mj.stages.skew import SkewSettings
 from cmg_mj.stages.vibration import VibrationSettings, vibration
 
 
@@ -42,7 +42,7 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
 
     def constant_errors(self) -> Callable[[Forces], Forces]:
         """Return a function: true specific forces (inner x, z, outer x, z) -> what parts without noise show [m/s^2]."""
-        mixed = mounting_errors(self)
+        mixed = mounting_errors(self).mixed
         inner, outer = self.bias
 
         def erring(forces: Forces) -> Forces:
@@ -51,20 +51,26 @@ class Accelerometer(VibrationSettings, LowPassSettings, FlickerSettings, SkewSet
 
         return erring
 
-    def at_work(self, site: Site) -> SampledSensor:
-        """Start the accelerometers."""
+    def at_work(self, site: Site) -> Sensor:
+        """Make the accelerometers of a run."""
         effects = (
-            (self.averaged, Averaged),
-            (self.skew_s, Skew),
+            (self.averaged, averaged),
             (self.vibrates, vibration),
             (self.mounting_weights() != PERFECT, mounting_errors),
             (True, white),
             (self.bias_instability_ug, flicker),
-            (self.bandwidth_hz, LowPass),
+            (self.bandwidth_hz, low_pass),
         )
-        digital = shown(self.range_g * STANDARD_GRAVITY, self.resolution)
-        stages = [*(make(self, site) for is_on, make in effects if is_on), digital]
-        return SampledSensor(self.rate_hz, self.latency_s, site, "motion" if self.averaged else "accelerations", stages)
+        stages = [make(self, site) for is_on, make in effects if is_on]
+        return Sensor(
+            "motion" if self.averaged else "accelerations",
+            (*stages, Digital(self.range_g * STANDARD_GRAVITY, self.resolution)),
+            period=site.steps(1.0 / self.rate_hz, "rate_hz", f"{self.rate_hz:g} Hz"),
+            latency=steps_until(self.latency_s, site.timestep),
+            inside=self.inside_steps(site),
+            settle=self.settle_samples,
+            skew=self.skew_steps(site),
+        )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -91,7 +97,11 @@ class Encoder:
         """Standard deviation of one reading from the angle, by the resolution [rad]."""
         return self.resolution / math.sqrt(12.0)
 
-    def at_work(self, site: Site) -> SampledSensor:
-        """Start the encoders."""
-        stages = [shown(math.inf, self.resolution)]
-        return SampledSensor(self.rate_hz, self.latency_s, site, "gimbals", stages)
+    def at_work(self, site: Site) -> Sensor:
+        """Make the encoders of a run."""
+        return Sensor(
+            "gimbals",
+            (Digital(math.inf, self.resolution),),
+            period=site.steps(1.0 / self.rate_hz, "rate_hz", f"{self.rate_hz:g} Hz"),
+            latency=steps_until(self.latency_s, site.timestep),
+        )

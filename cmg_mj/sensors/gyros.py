@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator
-from itertools import chain, islice
-from typing import Annotated, Literal
+from functools import cached_property
+from itertools import chain, count, islice
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, clip, digitise, radians
-from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream
-from cmg_mj.core.sensor import SampledSensor, Site
+from cmg_mj.core.arrays import Scalar, digitise, radians
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, wander_shares
+from cmg_mj.core.sensor import Cut, Memory, Sensor, SensorStage, Signal, Site, steps_until
+from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, Latency, NonNegative, Positive, Rate
+from cmg_mj.stages.pair import White
 
 PIECE = 1000
 """Samples before the run that are made together, whatever the rate."""
@@ -80,39 +84,22 @@ class MemsGyro:
         """Floor of the Allan deviation of the 1/f noise [rad/s]."""
         return math.radians(self.bias_instability_deg_h) / 3600.0
 
-    def make_reading_function(self, dt: float, noise: Iterator) -> Callable[[np.ndarray], np.ndarray]:
-        """Return the gyro at work.
+    def make_both(
+        self, dt: float, noise: Iterator, part: np.ndarray
+    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Make one part at work twice: calibrated, and as bought.
 
         Args:
             dt: Sample period [s].
             noise: Standard normals, a sample after the other: `channels` numbers, or an array (channels, n_worlds).
-
-        Returns:
-            A function: the next samples' true rate (n_rows, n_worlds) -> what the gyro shows, the same shape [rad/s].
-        """
-        errors, mean = self._errors(dt, noise)
-        offset = math.radians(self.bias_deg_s) - mean
-        return lambda rate: self._shown(rate, errors(len(rate)) + offset)
-
-    def make_both(
-        self, dt: float, noise: Iterator, part: np.ndarray
-    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Make one part at work twice: calibrated, as `make_reading_function` does, and as bought.
-
-        Args:
-            dt: Sample period [s].
-            noise: Standard normals: see `make_reading_function`.
             part: Numbers whose signs are those of the offset and of the drift, (2, n_worlds).
 
         Returns:
             A function: the next samples' true rate -> what both show, (n_rows, n_worlds) each [rad/s].
         """
-        errors, mean = self._errors(dt, noise)
-        bias = math.radians(self.bias_deg_s)
-        calibrated = bias - mean
-        signs = np.sign(part)
-        offset = bias + math.radians(self.as_bought_offset_deg_s) * signs[0]
-        drift = math.radians(self.as_bought_drift_deg_s_k * self.warming_k_min / 60.0) * dt * signs[1]
+        errors, _, mean = self._errors(dt, noise)
+        calibrated, _ = self._offset(dt, mean, part, "calibrated")
+        offset, drift = self._offset(dt, mean, part, "as_bought")
         start = 0
 
         def read(rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +108,7 @@ class MemsGyro:
             common = errors(n)
             as_bought = common + (offset + drift * np.arange(start, start + n)[:, None])
             start += n
-            return self._shown(rate, common + calibrated), self._shown(rate, as_bought)
+            return self.shown(rate, common + calibrated), self.shown(rate, as_bought)
 
         return read
 
@@ -132,24 +119,49 @@ class MemsGyro:
         part = np.array(next(noise(NoiseStream.MEMS_PART, 2))).reshape(2, -1)
         return self.make_both(dt, noise(NoiseStream.MEMS_GYRO, self.channels), part)
 
-    def at_work(self, site: Site, dt: float) -> SampledSensor:
-        """Start the gyro that observers read, every dt [s]: as bought or calibrated."""
-        read, is_calibrated = self.started(dt, site.noise), self.reading == "calibrated"
+    def at_work(self, site: Site, dt: float) -> Sensor:
+        """Make the gyro that observers read, every dt [s]: as bought or calibrated."""
+        stage = CheapGyro(self, dt, NoiseStream.MEMS_GYRO.on_axis(site.axis), NoiseStream.MEMS_PART.on_axis(site.axis))
+        return Sensor("gyro", (stage,), period=site.steps(dt, "rate_hz", f"{1.0 / dt:g} Hz"))
 
-        def show(rate: Scalar, ideal: IdealReading) -> Scalar:
-            calibrated, as_bought = read(np.atleast_2d(rate))
-            shown = (calibrated if is_calibrated else as_bought)[0]
-            return shown if np.ndim(rate) else shown.item()
+    def turn_gyro(self, dt: float) -> CheapGyro:
+        """Make such a gyro about the frame's vertical, calibrated and read every dt [s]."""
+        return CheapGyro(dataclasses.replace(self, reading="calibrated"), dt, NoiseStream.TURN_GYRO)
 
-        return SampledSensor(1.0 / dt, 0.0, site, "gyro", [show])
+    def rested(self, dt: float, noise: Iterator, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the state after the rest before a run: the arguments are those of `make_both`.
 
-    def _shown(self, rate: np.ndarray, errors: np.ndarray) -> np.ndarray:
-        """Read a true rate with these errors of the zero, (n_rows, n_worlds) [rad/s]."""
+        Returns:
+            The processes of the 1/f noise, (len(CORNERS_HZ), n_worlds); the offset, and its drift in a sample
+            (n_worlds,) [rad/s].
+        """
+        _, flicker, mean = self._errors(dt, noise)
+        offset, drift = self._offset(dt, mean, part, self.reading)
+        shape = np.shape(part[0])
+        return flicker.wander, np.broadcast_to(offset, shape), np.broadcast_to(drift, shape)
+
+    def resting_samples(self, dt: float) -> int:
+        """Count the samples of the calibration, one every dt [s]."""
+        return round(self.calibration_s / dt)
+
+    def _offset(self, dt: float, mean: Any, part: np.ndarray, reading: str) -> tuple[Any, Any]:
+        """Return the offset that remains, and its drift in a sample [rad/s]."""
+        bias = math.radians(self.bias_deg_s)
+        if reading == "calibrated":
+            return bias - mean, 0.0
+        signs = np.sign(part)
+        offset = bias + math.radians(self.as_bought_offset_deg_s) * signs[0]
+        return offset, math.radians(self.as_bought_drift_deg_s_k * self.warming_k_min / 60.0) * dt * signs[1]
+
+    def shown(self, rate: Scalar, errors: Scalar) -> Scalar:
+        """Read a true rate with these errors of the zero, elementwise [rad/s]."""
         step = math.radians(1.0 / self.counts_per_deg_s) if self.counts_per_deg_s else 0.0
         return digitise((1.0 + self.scale_error) * rate + errors, math.radians(self.range_deg_s), step)
 
-    def _errors(self, dt: float, noise: Iterator) -> tuple[Callable[[int], np.ndarray], np.ndarray | float]:
-        """Return the noise of the next n samples, (n, n_worlds), and its mean over the rest before the run [rad/s]."""
+    def _errors(
+        self, dt: float, noise: Iterator
+    ) -> tuple[Callable[[int], np.ndarray], FlickerNoise, np.ndarray | float]:
+        """Return the noise of the next n samples, (n, n_worlds), its 1/f part, and its mean over the rest [rad/s]."""
         sigma = self.white_noise_sigma(dt)
 
         def drawn(n: int) -> np.ndarray:
@@ -166,11 +178,66 @@ class MemsGyro:
             normals = drawn(n)
             return sigma * normals[:, 0] + flicker.advance(normals[:, 1:])
 
-        resting = round(self.calibration_s / dt)
+        resting = self.resting_samples(dt)
         pieces = [min(PIECE, resting - start) for start in range(0, resting, PIECE)]
         # Added one after the other: NumPy's sum takes another order for one world than for many.
         sums = (np.add.accumulate(errors(n))[-1] for n in pieces)
-        return errors, sum((total / resting for total in sums), 0.0)
+        return errors, flicker, sum((total / resting for total in sums), 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class CheapGyro(SensorStage):
+    """A cheap gyro at work.
+
+    Attributes:
+        gyro: Its settings.
+        dt: Sample period [s].
+        stream: Number of its noise stream.
+        part_stream: Number of the stream of the part, if it is read as bought.
+    """
+
+    gyro: MemsGyro
+    dt: float
+    stream: int
+    part_stream: int = -1
+
+    @property
+    def draws(self) -> dict[int, int]:
+        """See `SensorStage`."""
+        bought = {self.part_stream: 2} if self.gyro.reading == "as_bought" else {}
+        return {self.stream: self.gyro.channels, **bought}
+
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return the processes of the 1/f noise, the offset, its drift in a sample, and the samples taken."""
+        rests = map(tables[self.stream], count())
+        part = np.array(tables[self.part_stream](0) if self.part_stream in self.draws else [0.0 * signal[0]] * 2)
+        part = part.reshape(2, -1)
+        *wander, offset, drift = (row for rows in self.gyro.rested(self.dt, rests, part) for row in np.atleast_2d(rows))
+        numbers = [*wander, offset, drift, np.zeros_like(offset)]
+        return tuple(number.copy() if np.ndim(signal[0]) else number.item() for number in numbers)
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        *wander, offset, drift, taken = memory
+        white, *normals = tables[self.stream](sample + self._before)
+        decays, spreads = self._shares
+        moved = zip(spreads, normals, decays, wander, strict=True)
+        after = [spread * normal + decay * before for spread, normal, decay, before in moved]
+        one, two, three, four = after
+        common = self.gyro.white_noise_sigma(self.dt) * white + (one + two + three + four)
+        shown = self.gyro.shown(signal[0], common + (offset + drift * taken))
+        return (*after, offset, drift, taken + 1.0), (shown,)
+
+    @cached_property
+    def _before(self) -> int:
+        """Samples of the stream before the run: the start of the 1/f noise, and the calibration."""
+        return 1 + self.gyro.resting_samples(self.dt)
+
+    @cached_property
+    def _shares(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        return wander_shares(self.gyro.flicker_floor, self.dt)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -206,16 +273,41 @@ class Fog:
         """Share of a step that the low-pass has taken after one sample period."""
         return 1.0 - math.exp(-2.0 * math.pi * self.bandwidth_hz / self.rate_hz) if self.bandwidth_hz else 1.0
 
-    def at_work(self, site: Site) -> SampledSensor:
-        """Start the gyro: its low-pass, noise, offset and range."""
-        noise, sigma = site.noise(NoiseStream.FOG, 1), self.white_noise_sigma
-        bias, limit = math.radians(self.bias_deg_h) / 3600.0, math.radians(self.range_deg_s)
-        share, passed = self.step_share, None
+    def at_work(self, site: Site) -> Sensor:
+        """Make the gyro of a run: its low-pass, noise, offset and range."""
+        bias = math.radians(self.bias_deg_h) / 3600.0
+        stages = (
+            Lag(self.step_share),
+            White(NoiseStream.FOG.on_axis(site.axis), self.white_noise_sigma, (bias,)),
+            Cut(math.radians(self.range_deg_s)),
+        )
+        return Sensor(
+            "gyro",
+            stages,
+            period=site.steps(1.0 / self.rate_hz, "rate_hz", f"{self.rate_hz:g} Hz"),
+            latency=steps_until(self.latency_s, site.timestep),
+        )
 
-        def show(rate: Scalar, ideal: IdealReading) -> Scalar:
-            nonlocal passed
-            passed = rate if passed is None else passed + share * (rate - passed)
-            (normal,) = next(noise)
-            return clip(passed + bias + sigma * normal, -limit, limit)
 
-        return SampledSensor(self.rate_hz, self.latency_s, site, "gyro", [show])
+@dataclasses.dataclass(frozen=True)
+class Lag(SensorStage):
+    """A low-pass of first order, settled on the first signal.
+
+    Attributes:
+        share: Share of a step that it has taken after one sample period.
+    """
+
+    share: float
+
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return what it shows."""
+        return ()
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        if not sample:
+            return tuple(signal), signal
+        passed = tuple(before + self.share * (x - before) for before, x in zip(memory, signal, strict=True))
+        return passed, passed

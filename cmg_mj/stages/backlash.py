@@ -6,46 +6,48 @@ The observers get the command, not the motion of the gimbals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, clip, where
+from cmg_mj.core.sensor import Memory
 
 ARCMIN_A_DEGREE = 60.0
 
 
+@dataclass(frozen=True)
 class Backlash:
     """The play operator: gimbal+ = gimbal, limited to motor+ -+ gap/2, from the middle of the gap.
 
-    Args:
+    Attributes:
         gap: From one side to the other, a float or an array (n_worlds,) [rad].
         dt: Control period [s].
     """
 
-    def __init__(self, gap: Scalar, dt: float) -> None:
-        self.gap = gap
-        self._dt = dt
-        self._motor: Scalar = None
-        self._gimbal: Scalar = None
+    gap: Scalar
+    dt: float
 
-    def __call__(self, u: Scalar) -> Scalar:
+    def init(self, u: Scalar) -> Memory:
+        """Return the angles of motor and gimbal [rad]."""
+        return 0.0 * u, 0.0 * u
+
+    def step(self, memory: Memory, u: Scalar) -> tuple[Memory, Scalar]:
         """Return the gimbals' rate under a command that is held for a period.
 
         Args:
+            memory: The memory.
             u: The rate of the motors [rad/s].
 
         Returns:
-            The rate at which the gimbals are turned meanwhile; where there is no gap, u itself [rad/s].
+            The next memory, and the rate at which the gimbals are turned meanwhile; where there is no gap, u itself
+            [rad/s].
         """
-        if self._motor is None:
-            self._motor = self._gimbal = 0.0 * u
+        motor, before = memory
         half = self.gap / 2.0
-        self._motor = self._motor + u * self._dt
-        before = self._gimbal
-        self._gimbal = clip(before, self._motor - half, self._motor + half)
-        return where(self.gap > 0.0, (self._gimbal - before) / self._dt, u)
+        motor = motor + u * self.dt
+        gimbal = clip(before, motor - half, motor + half)
+        return (motor, gimbal), where(self.gap > 0.0, (gimbal - before) / self.dt, u)
 
 
-def backlash(gap: Scalar) -> tuple[Callable[[float], Backlash], ...]:
+def backlash(gap: Scalar, dt: float) -> tuple[Backlash, ...]:
     """Make the stage of servos whose gap is not zero in every world [rad]."""
-    return () if type(gap) is float and not gap else (partial(Backlash, gap),)
+    return () if type(gap) is float and not gap else (Backlash(gap, dt),)

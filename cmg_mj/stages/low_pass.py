@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass as settings
 
 from cmg_mj.core.arrays import Scalar, clip
-from cmg_mj.core.sensor import Site, Timing
-from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
+from cmg_mj.core.sensor import Memory, SensorStage, Signal, Site, each, together
+from cmg_mj.core.straight_line import Tables
+from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
 
@@ -21,7 +24,7 @@ MIN_BANDWIDTH_HZ = 1.0
 """No part has a narrower low-pass, and one needs as many samples to settle [Hz]."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@settings(frozen=True, config=STRICT)
 class LowPassSettings(PairSettings):
     """The low-pass inside the accelerometers.
 
@@ -50,6 +53,15 @@ class LowPassSettings(PairSettings):
         return INSIDE_HZ if self.bandwidth_hz else 0.0
 
     @property
+    def settle_samples(self) -> int:
+        """Samples in which the low-pass forgets its start, all but 1e-4 of it; 0 without one."""
+        return math.ceil(2.0 * INSIDE_HZ / self.bandwidth_hz) if self.bandwidth_hz else 0
+
+    def inside_steps(self, site: Site) -> int:
+        """Count the physics steps between the samples that the part takes; 0: it takes those that it delivers."""
+        return site.steps(1.0 / INSIDE_HZ, "bandwidth_hz", self.inside_text) if self.bandwidth_hz else 0
+
+    @property
     def inside_text(self) -> str:
         """The bandwidth and the rate inside, as messages show them."""
         return f"{self.bandwidth_hz:g} Hz, sampled at {INSIDE_HZ:g} Hz inside the part"
@@ -60,36 +72,46 @@ class LowPassSettings(PairSettings):
         return noise_gain(self.bandwidth_hz, INSIDE_HZ) if self.bandwidth_hz else 1.0
 
 
-class LowPass:
-    """Filters every channel, cut at the range before. It starts settled.
+@dataclass(frozen=True)
+class LowPass(SensorStage):
+    """Filters every channel, cut at the range before. It starts settled on the first signal.
 
-    Args:
-        part: The accelerometers.
-        site: Their place in the run.
+    Attributes:
+        numerator: Coefficients on the samples, the newest first.
+        denominator: Coefficients on the results, the newest first, 1 the first of them.
+        limit: The range [m/s^2].
     """
 
-    def __init__(self, part: LowPassSettings, site: Site) -> None:
-        # So long a low-pass needs to forget its start, all but 1e-4 of it.
-        settle = math.ceil(2.0 * INSIDE_HZ / part.bandwidth_hz)
-        self.timing = Timing(inside=site.steps(1.0 / INSIDE_HZ, "bandwidth_hz", part.inside_text), settle=settle)
-        self._b, self._a = coefficients(part.bandwidth_hz, INSIDE_HZ)
-        self._limit = part.range_g * STANDARD_GRAVITY
-        self._memories: list[tuple[Scalar, Scalar]] = []
+    numerator: Sequence[float]
+    denominator: Sequence[float]
+    limit: float
 
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Return what the filters show."""
-        (b0, b1, b2), (_, a1, a2) = self._b, self._a
-        channels = [forces] if isinstance(forces, np.ndarray) else forces
-        cut = [clip(x, -self._limit, self._limit) for x in channels]
-        if not self._memories:
-            self._memories = [((1.0 - b0) * x, (b2 - a2) * x) for x in cut]
-        passed = []
-        for i, x in enumerate(cut):
-            first, second = self._memories[i]
-            y = b0 * x + first
-            self._memories[i] = b1 * x - a1 * y + second, b2 * x - a2 * y
-            passed.append(y)
-        return passed[0] if isinstance(forces, np.ndarray) else passed
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return two numbers a channel."""
+        b0, _, b2 = self.numerator
+        a2 = self.denominator[2]
+        cut = each(lambda x: clip(x, -self.limit, self.limit), signal)
+        return each(lambda x: (1.0 - b0) * x, cut), each(lambda x: (b2 - a2) * x, cut)
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        one, two, passed = together(self._filtered, signal, *memory)
+        return (one, two), passed
+
+    def _filtered(self, x: Scalar, one: Scalar, two: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        b0, b1, b2 = self.numerator
+        _, a1, a2 = self.denominator
+        cut = clip(x, -self.limit, self.limit)
+        y = b0 * cut + one
+        return b1 * cut - a1 * y + two, b2 * cut - a2 * y, y
+
+
+def low_pass(part: LowPassSettings, site: Site) -> LowPass:
+    """Make the stage of the low-pass."""
+    numerator, denominator = coefficients(part.bandwidth_hz, INSIDE_HZ)
+    return LowPass(numerator, denominator, part.range_g * STANDARD_GRAVITY)
 
 
 def noise_gain(bandwidth_hz: float, rate_hz: float) -> float:

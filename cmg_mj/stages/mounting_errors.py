@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass as settings
 
-from cmg_mj.core.sensor import Site
+from cmg_mj.core.sensor import Memory, SensorStage, Signal, Site
+from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import Forces, IdealReading
 from cmg_mj.inputs.types import STRICT
 from cmg_mj.stages.pair import PairSettings
@@ -23,7 +25,7 @@ Share = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Angle = Annotated[float, Field(gt=-45.0, lt=45.0)]
 
 
-@dataclass(frozen=True, config=STRICT)
+@settings(frozen=True, config=STRICT)
 class MountingErrorsSettings(PairSettings):
     """Errors of scale and mounting.
 
@@ -50,15 +52,33 @@ class MountingErrorsSettings(PairSettings):
         return same_axis, other_axis
 
 
-def mounting_errors(part: MountingErrorsSettings, site: Site | None = None) -> Callable[..., Forces]:
-    """Make the stage that mixes the two axes of each accelerometer: what the parts feel along the axes they show."""
-    same, other = part.mounting_weights()
-    by_same, by_other = np.array([same]).T, np.array([other]).T
+@dataclass(frozen=True)
+class MountingErrors(SensorStage):
+    """Mixes the two axes of each accelerometer: what the parts feel along the axes they show.
 
-    def mixed(forces: Forces, ideal: IdealReading | None = None) -> Forces:
+    Attributes:
+        same: Weight of each channel's own axis.
+        other: Weight of the other axis of the same part.
+    """
+
+    same: Sequence[float]
+    other: Sequence[float]
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        return memory, self.mixed(signal)
+
+    def mixed(self, forces: Forces) -> Forces:
+        """Return the forces along the axes of the parts."""
         if isinstance(forces, np.ndarray):
+            by_same, by_other = np.array([self.same]).T, np.array([self.other]).T
             return by_same * forces + by_other * forces[CROSSWISE]
         crossed = [forces[i] for i in CROSSWISE]
-        return [a * x + b * z for a, x, b, z in zip(same, forces, other, crossed, strict=True)]
+        return [a * x + b * z for a, x, b, z in zip(self.same, forces, self.other, crossed, strict=True)]
 
-    return mixed
+
+def mounting_errors(part: MountingErrorsSettings, site: Site | None = None) -> MountingErrors:
+    """Make the stage of errors of scale and mounting."""
+    return MountingErrors(*part.mounting_weights())

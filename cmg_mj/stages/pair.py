@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
 
 import numpy as np
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass as settings
 
-from cmg_mj.core.arrays import dot
+from cmg_mj.core.arrays import Scalar, dot
 from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.sensor import SensorStage, Site
-from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
+from cmg_mj.core.sensor import Memory, SensorStage, Signal, Site, each
+from cmg_mj.core.straight_line import Tables
+from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, Latency, NoiseSize, NonNegative, Positive, Rate
 
 
-@dataclass(frozen=True, config=STRICT)
+@settings(frozen=True, config=STRICT)
 class PairSettings:
     """Sampling, white noise, offsets, range and resolution of the accelerometers.
 
@@ -76,40 +79,88 @@ class PairSettings:
         return inner, outer
 
 
-class Averaged:
+@dataclass(frozen=True)
+class Averaged(SensorStage):
     """The mean specific force since the last sample, by the velocity's difference, in the axes of the last instant.
 
     A pass of the physics shows the acceleration of an instant, in which stiff servos and contacts answer to a setpoint
     or a command that has just changed.
+
+    Attributes:
+        period_s: Time between two samples [s].
     """
 
-    def __init__(self, part: PairSettings, site: Site) -> None:
-        self._period, self._last = 1.0 / part.raw_rate_hz, None
+    period_s: float
 
-    def __call__(self, motion: Any, ideal: IdealReading) -> Forces:
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return the motion of both."""
+        return signal
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
         """Return the forces by the motion of both."""
-        last, self._last = self._last or motion, motion
         forces = []
         for first in (0, 9):
-            v, x, z = (motion[first + i : first + i + 3] for i in (0, 3, 6))
-            a = [(now - before) / self._period for now, before in zip(v, last[first : first + 3], strict=True)]
-            a[2] = a[2] + motion[-1]
+            v, x, z = (signal[first + i : first + i + 3] for i in (0, 3, 6))
+            before = memory[first : first + 3]
+            a = [(now - then) / self.period_s for now, then in zip(v, before, strict=True)]
+            a[2] = a[2] + signal[-1]
             forces += [dot(x, a), dot(z, a)]
-        return np.array(forces) if isinstance(forces[0], np.ndarray) else forces
+        return signal, np.array(forces) if isinstance(forces[0], np.ndarray) else forces
 
 
-def white(part: PairSettings, site: Site) -> SensorStage:
+@dataclass(frozen=True)
+class White(SensorStage):
+    """Constant offsets, and white noise.
+
+    Attributes:
+        stream: Number of the noise stream.
+        sigma: Standard deviation of the noise, a float or an array (n_worlds,).
+        offsets: Offset of each channel, likewise.
+    """
+
+    stream: int
+    sigma: Scalar
+    offsets: tuple[Scalar, ...]
+
+    @property
+    def draws(self) -> dict[int, int]:
+        """See `SensorStage`."""
+        return {self.stream: len(self.offsets)}
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        normals = tables[self.stream](sample)
+        if not self._is_off:
+            return memory, each(self._white, signal, normals)
+        offsets = self._column if type(signal) is np.ndarray else self.offsets
+        return memory, each(self._noisy, signal, offsets, normals)
+
+    @cached_property
+    def _is_off(self) -> bool:
+        return any(np.any(offset) for offset in self.offsets)
+
+    def _white(self, x: Scalar, normal: Scalar) -> Scalar:
+        return x + self.sigma * normal
+
+    @cached_property
+    def _column(self) -> np.ndarray:
+        return np.array(np.broadcast_arrays(*self.offsets)).reshape(len(self.offsets), -1)
+
+    def _noisy(self, x: Scalar, offset: Scalar, normal: Scalar) -> Scalar:
+        return x + offset + self.sigma * normal
+
+
+def white(part: PairSettings, site: Site) -> White:
     """Make the stage of constant offsets and white noise."""
-    (inner, outer), sigma = part.bias, part.raw_sigma
-    offsets = np.array(np.broadcast_arrays(inner, 0.0, outer, 0.0)).reshape(4, -1)
-    noise = site.noise(NoiseStream.ACCELEROMETER, part.channels)
+    inner, outer = part.bias
+    stream = NoiseStream.ACCELEROMETER.on_axis(site.axis)
+    return White(stream, part.raw_sigma, (inner, 0.0, outer, 0.0))
 
-    def add(forces: Forces, ideal: IdealReading) -> Forces:
-        normal = next(noise)
-        if isinstance(forces, np.ndarray):
-            return forces + offsets + sigma * np.asarray(normal)
-        n0, n1, n2, n3 = normal
-        ix, iz, ox, oz = forces
-        return ix + inner + sigma * n0, iz + sigma * n1, ox + outer + sigma * n2, oz + sigma * n3
 
-    return add
+def averaged(part: PairSettings, site: Site) -> Averaged:
+    """Make the stage of means."""
+    return Averaged(1.0 / part.raw_rate_hz)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
@@ -59,29 +60,25 @@ class Pushes(Disturbance):
     """
 
     def __init__(self, pushes: Sequence[Push], timestep: float, axes: Sequence[str]) -> None:
-        self._changes: dict[int, list[Scalar]] = {}
+        changes: dict[int, list[Scalar]] = {0: [0.0] * len(axes)}
         for push in pushes:
             for time, torque in ((push.start_s, push.torque_n_m), (push.end_s, -push.torque_n_m)):
                 step = whole_steps(time, timestep, "push", f"{time:g} s")
-                change = self._changes.setdefault(step, [0.0] * len(axes))
+                change = changes.setdefault(step, [0.0] * len(axes))
                 about = push.axis or axes[0]
                 if about in axes:
                     change[axes.index(about)] += torque
-        self.edges = self._changes.keys()
-        self._torques: list[Scalar] = [0.0] * len(axes)
-        self._before: Outside | None = None
-        self._sum = Outside(())
+        self.edges = sorted(changes)
+        self._outsides = []
+        torques: list[Scalar] = [0.0] * len(axes)
+        for step in self.edges:
+            torques = [torque + more for torque, more in zip(torques, changes[step], strict=True)]
+            held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in torques]  # no remainders
+            self._outsides.append(Outside(held))
 
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """Add the torques: see `Disturbance`."""
-        if change := self._changes.get(step):
-            self._torques = [torque + more for torque, more in zip(self._torques, change, strict=True)]
-        elif outside is self._before:
-            return self._sum
-        held = [where(abs(torque) > 1e-12, torque, 0.0) for torque in self._torques]  # no remainders
-        self._before = outside
-        self._sum = outside._replace(torques=[a + b for a, b in zip(outside.torques, held, strict=True)])
-        return self._sum
+    def at(self, step: int, steps: int) -> Outside:
+        """Return the torques: see `Disturbance`."""
+        return self._outsides[bisect_right(self.edges, step) - 1]
 
 
 def push_windows(pushes: Iterable[Push]) -> list[Window]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Annotated
 
-import numpy as np
 from pydantic import ValidationInfo, field_validator
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.sensor import Site, Timing
-from cmg_mj.core.types import Forces, IdealReading
+from cmg_mj.core.sensor import Site
 from cmg_mj.inputs.types import STRICT, NonNegative, OnGrid
 from cmg_mj.stages.pair import PairSettings
 
@@ -31,32 +28,10 @@ class SkewSettings(PairSettings):
         rate = info.data.get("rate_hz")
         if rate and skew_s > (1.0 + 1e-9) / rate:
             raise ValueError(f"{skew_s:g} s: at most one sample period, {1.0 / rate:g} s at rate_hz = {rate:g}")
+        if skew_s and info.data.get("averaged"):
+            raise ValueError(f"{skew_s:g} s: of means since the sample before there is none; leave out averaged")
         return skew_s
 
-
-class Skew:
-    """Combines the inner accelerometer's sample with an older one of the outer, which it keeps.
-
-    Args:
-        part: The accelerometers.
-        site: Their place in the run.
-    """
-
-    def __init__(self, part: SkewSettings, site: Site) -> None:
-        self._steps = site.steps(part.skew_s, "skew_s", f"{part.skew_s:g} s")
-        self.timing = Timing(grid=self._steps)
-        self._outer: deque[tuple[int, Forces]] = deque()
-
-    def watch(self, step: int, period: int, ideal: IdealReading) -> None:
-        """Keep the sample of the outer one that is due, and drop those that are too old."""
-        if not self._outer or (step + self._steps) % period == 0:
-            self._outer.append((step, ideal.accelerations))
-        while len(self._outer) > 1 and self._outer[1][0] <= step - self._steps:
-            self._outer.popleft()
-
-    def __call__(self, forces: Forces, ideal: IdealReading) -> Forces:
-        """Return the inner one's forces and the outer one's of earlier."""
-        outer = self._outer[0][1]
-        if isinstance(forces, np.ndarray):
-            return np.concatenate([forces[:2], outer[2:]])
-        return (*forces[:2], *outer[2:])
+    def skew_steps(self, site: Site) -> int:
+        """Count the physics steps by which the outer accelerometer's samples are older: see `Sensor.skew`."""
+        return site.steps(self.skew_s, "skew_s", f"{self.skew_s:g} s") if self.skew_s else 0

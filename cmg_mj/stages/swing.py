@@ -60,11 +60,12 @@ class Swings(Disturbance):
     def __init__(self, swings: Sequence[Swing], timestep: float, axes: Sequence[str]) -> None:
         self._swings, self._timestep, self._axes = swings, timestep, axes
 
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """Add the torques: see `Disturbance`."""
+    def at(self, step: int, steps: int) -> Outside:
+        """Return the torques: see `Disturbance`."""
         time = (step + 0.5 * steps) * self._timestep
-        added = [
-            sum(swing.torque(time) for swing in self._swings if (swing.axis or self._axes[0]) == axis)
-            for axis in self._axes
-        ]
-        return outside._replace(torques=[a + b for a, b in zip(outside.torques, added, strict=True)])
+        return Outside(
+            [
+                sum(swing.torque(time) for swing in self._swings if (swing.axis or self._axes[0]) == axis)
+                for axis in self._axes
+            ]
+        )

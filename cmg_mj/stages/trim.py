@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.sensor import steps_until
 from cmg_mj.core.types import BIAS, Law, State
@@ -59,6 +59,6 @@ def trims(seconds: float, law: Law, extra_signals: Sequence[str], timestep: floa
     return [Trim(steps_until(seconds, timestep), 3 + list(extra_signals).index(BIAS), gain)]
 
 
-def trim_of(controller: Controller) -> Trim:
-    """Return the trim of a controller; one that never holds for a controller without it."""
-    return next((stage for stage in controller.memories if isinstance(stage, Trim)), Trim())
+def trim_of(axis: AxisControl) -> Trim:
+    """Return the trim of an axis; one that never holds for an axis without it."""
+    return next((stage for stage in axis.memories if isinstance(stage, Trim)), Trim())

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
-from cmg_mj.core.arrays import clip, cos, dot, sin, where
-from cmg_mj.core.controller import Controller
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.arrays import Scalar, clip, cos, dot, sin, where
+from cmg_mj.core.axis import AxisControl, Tick
+from cmg_mj.core.rig import AxesOrders
+from cmg_mj.core.sensor import Memory, SensorStage
+from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import MultiAxisReading
 
 
@@ -34,14 +34,15 @@ class YawCoupling(NamedTuple):
     Coriolis' acceleration, once of the frame and once of the point in it.
     """
 
-    flywheels: np.ndarray
+    flywheels: Sequence[Sequence[float]]
     """c [1]: for two axes at right angles whose pairs are alike +-1."""
-    inertia: np.ndarray
+    inertia: Sequence[Sequence[float]]
     """d [s]."""
-    coriolis: np.ndarray
+    coriolis: Sequence[Sequence[float]]
     """k [1]."""
 
 
+@dataclass(frozen=True)
 class Turning:
     """Cancels the torques that reach an axis from the others while the rig turns about the vertical at w.
 
@@ -50,45 +51,67 @@ class Turning:
 
         u_i = w sum_j (c_ij sin(x3_j) + d_ij x2_j) / cos(x3_i)
 
-    (`YawCoupling`) beside the law's own u, with the x2_j that is fed back (the observers', unless `feedback` says
-    otherwise). The observers get the law's u alone: the rest makes no torque. w k_ij x2_j, with x2_j of the tick
-    before, is subtracted from the accelerometers' angular acceleration. w is the reading of a cheap gyro about the
-    frame's vertical.
+    (`YawCoupling`) beside what is ordered already, with the x2_j that is fed back (the observers', unless `feedback`
+    says otherwise). The observers are not told of it: it makes no torque. w k_ij x2_j, with x2_j of the tick before, is
+    subtracted from the accelerometers' angular acceleration. w is the reading of a cheap gyro about the frame's
+    vertical.
 
-    Args:
+    Attributes:
         coupling: The coefficients.
-        gyro: The gyro that shows w, such as `MemsGyro`.
-        first: The first axis' controller.
+        gyro: The gyro that shows w, at work.
+        limits: Largest gimbal rate of each axis, floats or arrays (n_worlds,) [rad/s].
+        feedback: The rate that each axis feeds back.
     """
 
-    def __init__(self, coupling: YawCoupling, gyro: Any, first: Controller) -> None:
-        self._coupling = [coefficients.tolist() for coefficients in coupling]
-        noise = normals(first.seed, first.world_ids, NoiseStream.TURN_GYRO, gyro.channels)
-        self._read = gyro.make_reading_function(first.law.dt, noise)
+    coupling: YawCoupling
+    gyro: SensorStage
+    limits: Sequence[Scalar]
+    feedback: Sequence[str]
 
-    def __call__(self, controllers: Sequence[Controller], ideals: MultiAxisReading) -> None:
-        """Add to each axis' command what cancels the torque of momenta that are swept round."""
-        flywheels, inertia, coriolis = self._coupling
-        turn_rate = ideals.turn_rate
-        read = self._read(np.atleast_1d(turn_rate)[None, :])[0]
-        w = float(read[0]) if type(turn_rate) is float else read
-        ticks = [part.tick for part in controllers if part.tick is not None]
+    actuators: ClassVar[Sequence[int]] = ()
+    tables: ClassVar[Mapping[Any, Any]] = {}
+
+    @property
+    def draws(self) -> Mapping[int, int]:
+        """See `AxesStage`."""
+        return self.gyro.draws
+
+    def init(self, readings: MultiAxisReading, tables: Tables) -> Memory:
+        """Return the gyro's memory and the number of its samples."""
+        return self.gyro.init((readings.turn_rate,), readings.axes[0], tables), 0
+
+    def step(
+        self,
+        memory: Memory,
+        step: int,
+        orders: AxesOrders,
+        ticks: Sequence[Tick],
+        readings: MultiAxisReading,
+        tables: Tables,
+    ) -> tuple[Memory, AxesOrders]:
+        """Add to each axis' rate what cancels the torque of momenta that are swept round."""
+        shown, sample = memory
+        shown, (w,) = self.gyro.step(shown, (readings.turn_rate,), readings.axes[0], sample, tables)
         turned = [sin(tick.y2) for tick in ticks]
-        known = zip(controllers, ticks, ideals.axes, strict=True)
+        fed = zip(self.feedback, ticks, readings.axes, strict=True)
         rates = [
-            {"observer": tick.estimates[0][1], "fog": tick.fog, "truth": ideal.rate}[part.feedback]
-            for part, tick, ideal in known
+            {"observer": tick.estimates[0][1], "fog": tick.fog, "truth": ideal.rate}[feedback]
+            for feedback, tick, ideal in fed
         ]
-        for part, tick, c, d, k in zip(controllers, ticks, flywheels, inertia, coriolis, strict=True):
-            added = w * (dot(c, turned) + dot(d, rates)) / cos(tick.y2)
-            limit = part.law.rate_limit
-            total = clip(tick.u + added, -limit, limit)
-            u = where(tick.u + added == total, tick.u, total - added)  # the law's, as far as it was not limited
-            part.coriolis = w * dot(k, rates)
-            part.tick = tick._replace(u=u)
-            part.command_rate(total)
+        flywheels, inertia, coriolis = self.coupling
+        told, turns, known = [], [], []
+        for i, tick in enumerate(ticks):
+            added = w * (dot(flywheels[i], turned) + dot(inertia[i], rates)) / cos(tick.y2)
+            wanted = orders.rates[i] + added
+            total = clip(wanted, -self.limits[i], self.limits[i])
+            turns.append(total)
+            told.append(where(wanted == total, orders.told[i], total - added))  # as far as it was not limited
+            before = orders.known[i]
+            known.append(before._replace(acceleration=before.acceleration + w * dot(coriolis[i], rates)))
+        return (shown, sample + 1), orders._replace(told=told, rates=turns, known=known)
 
 
-def compensation(coupling: YawCoupling, gyro: Any) -> Callable[[Controller], Turning]:
-    """Make the stage between the axes: see `Turning`."""
-    return partial(Turning, coupling, gyro)
+def compensation(coupling: YawCoupling, gyro: SensorStage, axes: Sequence[AxisControl]) -> Turning:
+    """Make the stage between these axes, with a gyro about the vertical at work: see `Turning`."""
+    limits = [axis.law.rate_limit for axis in axes]
+    return Turning(coupling, gyro, limits, [axis.feedback for axis in axes])

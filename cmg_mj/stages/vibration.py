@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic.dataclasses import dataclass as settings
 
 from cmg_mj.core.arrays import Scalar, atan2, cos, sin
 from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.sensor import SensorStage, Site
-from cmg_mj.core.types import STANDARD_GRAVITY, Forces, IdealReading
+from cmg_mj.core.sensor import Memory, SensorStage, Signal, Site
+from cmg_mj.core.straight_line import Tables
+from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, NoiseSize, NonNegative
 from cmg_mj.stages.pair import PairSettings
 
@@ -24,7 +27,7 @@ AXES = 4
 """Axes that vibrate: x and z of the inner and of the outer accelerometer."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@settings(frozen=True, config=STRICT)
 class VibrationSettings(PairSettings):
     """Vibration of the accelerometers.
 
@@ -52,22 +55,44 @@ class VibrationSettings(PairSettings):
         return bool(np.any(self.vibration_mg)) or any(self.wheel_harmonics_mg)
 
 
+@dataclass(frozen=True)
 class BroadbandVibration:
     """White noise behind the band-pass b s/(s^2 + b s + w^2), of RMS 1, as if it had been on for ever.
 
     Its half-power frequencies are the band's ends; beyond them it falls by 6 dB an octave. Samples come from the exact
     discrete form, so that their statistics are those of the continuous vibration at any rate, with all its aliases.
 
-    Args:
+    Attributes:
+        stream: Number of the noise stream.
         band_hz: Both ends of the band [Hz].
         dt: Sample period [s].
-        noise: Standard normals, `channels` a sample.
     """
 
-    channels = 2 * AXES
+    stream: int
+    band_hz: tuple[float, float]
+    dt: float
 
-    def __init__(self, band_hz: tuple[float, float], dt: float, noise: Iterator[Sequence[Scalar]]) -> None:
-        low, high = band_hz
+    width = 2 * AXES
+
+    def init(self, tables: Tables) -> Memory:
+        """Return the band-pass' integral, times w, and the band-pass, of each axis."""
+        start = tables[self.stream](0)
+        return list(start[:AXES]), list(start[AXES:])
+
+    def step(self, memory: Memory, sample: int, tables: Tables) -> Memory:
+        """Advance by a sample."""
+        (a, b, d, e), (first, cross, second) = self._shares
+        drawn = tables[self.stream](sample + 1)
+        integrals, values = [], []
+        for x, v, n, m in zip(*memory, drawn[:AXES], drawn[AXES:], strict=True):
+            integrals.append(a * x + b * v + first * n)
+            values.append(d * x + e * v + (cross * n + second * m))
+        return integrals, values
+
+    @cached_property
+    def _shares(self) -> tuple[tuple[float, float, float, float], tuple[float, float, float]]:
+        """Shares of integral and band-pass in their next values, and of the normals."""
+        (low, high), dt = self.band_hz, self.dt
         w, half = 2.0 * math.pi * math.sqrt(low * high), math.pi * (high - low)
         apart = cmath.sqrt(half * half - w * w)
         slow, fast = (-w * w / (half + apart), -half - apart)  # the poles; their difference cancels nothing
@@ -76,77 +101,107 @@ class BroadbandVibration:
             slope = ((cmath.exp(slow * dt) - cmath.exp(fast * dt)) / (2.0 * apart)).real
         else:
             slope = dt * math.exp(-half * dt)
-        # Of the band-pass' integral, times w, and of the band-pass, each of RMS 1.
         a, b, e = mean + half * slope, w * slope, mean - half * slope
-        self._phi = (a, b, -b, e)
         first = math.sqrt(max(1.0 - a * a - b * b, 0.0))
         cross = (a * b - b * e) / first if first else 0.0
-        self._spread = (first, cross, math.sqrt(max(1.0 - b * b - e * e - cross * cross, 0.0)))
-        self._noise = noise
-        start = next(noise)
-        self._integral, self._value = list(start[:AXES]), list(start[AXES:])
-
-    def advance(self) -> list[Scalar]:
-        """Return the next sample of each axis."""
-        (a, b, d, e), (first, cross, second) = self._phi, self._spread
-        drawn = next(self._noise)
-        for i in range(AXES):
-            x, v, n, m = self._integral[i], self._value[i], drawn[i], drawn[AXES + i]
-            self._integral[i] = a * x + b * v + first * n
-            self._value[i] = d * x + e * v + (cross * n + second * m)
-        return list(self._value)
+        second = math.sqrt(max(1.0 - b * b - e * e - cross * cross, 0.0))
+        return (a, b, -b, e), (first, cross, second)
 
 
+@dataclass(frozen=True)
 class WheelTones:
     """Tones at whole multiples of each flywheel's speed, which follow it: their phase is its angle, times the multiple.
 
-    Args:
-        harmonics: The amplitude of each multiple, from 1 on.
+    The phase at the start differs by axis, wheel and multiple.
+
+    Attributes:
+        stream: Number of the noise stream.
+        amplitudes: The amplitude of each multiple, from 1 on.
         dt: Sample period [s].
-        noise: Standard normals, two a number: the phase at the start differs by axis, wheel and multiple.
     """
 
-    def __init__(self, harmonics: Sequence[float], dt: float, noise: Iterator[Sequence[Scalar]]) -> None:
-        self._harmonics, self._dt, self._noise = harmonics, dt, noise
-        self._angles: list[Scalar] = []
-        self._rates: Sequence[Scalar] = ()
-        self._starts: list[Scalar] = []
+    stream: int
+    amplitudes: Sequence[float]
+    dt: float
 
-    def advance(self, rates: Sequence[Scalar]) -> list[Scalar]:
-        """Return the next sample of each axis, at the flywheels' rates there, one a wheel [rad/s]."""
-        if not self._angles:
-            self._angles, self._rates = [0.0 * rate for rate in rates], rates
-            draws = (next(self._noise) for _ in range(AXES * len(rates) * len(self._harmonics)))
-            self._starts = [atan2(n, m) for n, m in draws]
-        else:  # the rate runs straight between samples
-            pairs = zip(self._angles, self._rates, rates, strict=True)
-            self._angles = [angle + 0.5 * self._dt * (before + now) for angle, before, now in pairs]
-            self._rates = rates
-        starts, total = iter(self._starts), [0.0 * self._angles[0]] * AXES
-        for angle in self._angles:
-            for multiple, amplitude in enumerate(self._harmonics, 1):
+    width = 2
+
+    def init(self, rates: Sequence[Scalar], tables: Tables) -> Memory:
+        """Return each wheel's angle, its rate, and the phases at the start."""
+        drawn = map(tables[self.stream], range(AXES * len(rates) * len(self.amplitudes)))
+        starts = [atan2(n, m) for n, m in drawn]
+        return [0.0 * rate for rate in rates], list(rates), starts
+
+    def step(self, memory: Memory, rates: Sequence[Scalar]) -> Memory:
+        """Advance by a sample, at the flywheels' rates there; they run straight between samples [rad/s]."""
+        angles, before, starts = memory
+        means = [0.5 * self.dt * (then + now) for then, now in zip(before, rates, strict=True)]
+        return [angle + mean for angle, mean in zip(angles, means, strict=True)], list(rates), starts
+
+    def tones(self, memory: Memory) -> list[Scalar]:
+        """Return the sum of the tones in each axis."""
+        angles, _, starts = memory
+        phases, total = iter(starts), [0.0 * angles[0]] * AXES
+        for angle in angles:
+            for multiple, amplitude in enumerate(self.amplitudes, 1):
                 s, c = sin(multiple * angle), cos(multiple * angle)
                 for i in range(AXES):
-                    start = next(starts)
-                    total[i] = total[i] + amplitude * (s * cos(start) + c * sin(start))
+                    phase = next(phases)
+                    total[i] = total[i] + amplitude * (s * cos(phase) + c * sin(phase))
         return total
 
 
-def vibration(part: VibrationSettings, site: Site) -> SensorStage:
-    """Make the stage that adds the vibration to the true specific forces."""
+@dataclass(frozen=True)
+class Vibration(SensorStage):
+    """Vibration added to the true specific forces.
+
+    Attributes:
+        rms: RMS of the broadband vibration of each axis, a float or an array (n_worlds,) [m/s^2].
+        broadband: The broadband vibration; None if there is none in any world.
+        tones: The flywheels' tones, of amplitudes in m/s^2; None if there are none.
+    """
+
+    rms: Scalar
+    broadband: BroadbandVibration | None
+    tones: WheelTones | None
+
+    @property
+    def draws(self) -> dict[int, int]:
+        """See `SensorStage`."""
+        return {source.stream: source.width for source in (self.broadband, self.tones) if source is not None}
+
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        """Return the memories of both."""
+        broadband = () if self.broadband is None else self.broadband.init(tables)
+        tones = () if self.tones is None else self.tones.init(ideal.wheels, tables)
+        return broadband, tones
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        """See `SensorStage`."""
+        broadband, tones = memory
+        added = [0.0] * AXES
+        if self.broadband is not None:
+            broadband = self.broadband.step(broadband, sample, tables)
+            added = [self.rms * value for value in broadband[1]]
+        if self.tones is not None and ideal.wheels:
+            if sample:
+                tones = self.tones.step(tones, ideal.wheels)
+            added = [value + tone for value, tone in zip(added, self.tones.tones(tones), strict=True)]
+        if isinstance(signal, np.ndarray):
+            return (broadband, tones), signal + np.array(added)
+        return (broadband, tones), [force + more for force, more in zip(signal, added, strict=True)]
+
+
+def vibration(part: VibrationSettings, site: Site) -> Vibration:
+    """Make the stage of vibration."""
     dt, milli_g = 1.0 / part.raw_rate_hz, 1e-3 * STANDARD_GRAVITY
-    rms, is_broad = milli_g * part.vibration_mg, np.any(part.vibration_mg)
-    numbers = site.noise(NoiseStream.VIBRATION, BroadbandVibration.channels)
-    broadband = BroadbandVibration(part.vibration_band_hz, dt, numbers)
-    amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
-    tones = WheelTones(amplitudes, dt, site.noise(NoiseStream.WHEEL_TONES, 2))
-
-    def add(forces: Forces, ideal: IdealReading) -> Forces:
-        added = [rms * part for part in broadband.advance()] if is_broad else [0.0] * AXES
-        if amplitudes and ideal.wheels:
-            added = [part + tone for part, tone in zip(added, tones.advance(ideal.wheels), strict=True)]
-        if isinstance(forces, np.ndarray):
-            return forces + np.array(added)
-        return [force + part for force, part in zip(forces, added, strict=True)]
-
-    return add
+    broadband = tones = None
+    if np.any(part.vibration_mg):
+        stream = NoiseStream.VIBRATION.on_axis(site.axis)
+        broadband = BroadbandVibration(stream, part.vibration_band_hz, dt)
+    if any(part.wheel_harmonics_mg):
+        amplitudes = [milli_g * amplitude for amplitude in part.wheel_harmonics_mg]
+        tones = WheelTones(NoiseStream.WHEEL_TONES.on_axis(site.axis), amplitudes, dt)
+    return Vibration(milli_g * part.vibration_mg, broadband, tones)

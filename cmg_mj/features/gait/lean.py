@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-
-from cmg_mj.core.arrays import Scalar, clip, where
-from cmg_mj.core.controller import Tick
+from cmg_mj.core.arrays import Scalar, clip, dot, where
+from cmg_mj.core.axis import Tick
 from cmg_mj.core.reduced_model import ReducedModel
 
 SETTLED_S = 0.05
@@ -19,6 +19,28 @@ MOST = math.radians(3.0)
 """No larger bias is believed [rad]."""
 
 
+class Leaning(NamedTuple):
+    """The memory of `Lean`; lists have a number an axis."""
+
+    bias: list[Scalar]
+    """e [rad]."""
+    lean: list[Scalar]
+    """The part of e that the torso's place has taken away [rad]."""
+    speed: list[Scalar]
+    """Rate of the lean [rad/s]."""
+    seen: list[Scalar]
+    """Time in which the axis was free [s]."""
+    known_tilt: list[Scalar]
+    """Tilt by which accelerometers err while the torso is moved [rad]."""
+    both: Scalar
+    """1 if both feet stood."""
+    settled: Scalar
+    """Time since a foot landed or lifted, or did so early or late [s]."""
+    expected: list[tuple[Scalar, Scalar]] | None = None
+    """x2, and f2 with the command that is held; None before the first tick."""
+
+
+@dataclass(frozen=True)
 class Lean:
     """Finds e of each axis, and the lean: the part of e that the torso's place has taken away.
 
@@ -26,63 +48,74 @@ class Lean:
     time in which the axis was free. The lean follows as a second-order filter, lean'' = w^2 (e - lean) - 2 w lean' with
     w = 2/`time_s`; it takes the torso by `height` lean to the other side.
 
-    Args:
+    Attributes:
         models: The reduced model of each axis.
         dt: Control period [s].
         time_s: Time constant of the lean; 0: nothing is found and the torso stays [s].
         fall_s2: height/g [s^2].
-        zero: 0 for one world, or an array (n_worlds,).
-
-    Attributes:
-        bias: e of each axis [rad].
-        lean: Likewise [rad].
-        known_tilt: Tilt by which accelerometers err while the torso is moved [rad].
     """
 
-    def __init__(self, models: Sequence[ReducedModel], dt: float, time_s: float, fall_s2: float, zero: Scalar) -> None:
-        self._models, self._dt, self._time, self._fall = models, dt, time_s, fall_s2
-        self.bias: list[Scalar] = [zero] * len(models)
-        self.lean, self.known_tilt = list(self.bias), list(self.bias)
-        self._speed, self._seen = list(self.bias), list(self.bias)
-        self._before: list[tuple[Scalar, Scalar]] = []
-        self._both, self._settled = zero, zero
+    models: Sequence[ReducedModel]
+    dt: float
+    time_s: float
+    fall_s2: float
 
-    def update(self, ticks: Sequence[Tick], line: np.ndarray, both: Scalar, planned: bool) -> None:
+    def init(self, zero: Scalar) -> Leaning:
+        """Return the memory before the first tick; zero is a float or an array (n_worlds,)."""
+        nothing = [zero] * len(self.models)
+        return Leaning(nothing, nothing, nothing, nothing, nothing, zero, zero)
+
+    def step(
+        self,
+        memory: Leaning,
+        ticks: Sequence[Tick],
+        told: Sequence[Scalar],
+        line: Sequence[float],
+        both: Scalar,
+        planned: float,
+    ) -> Leaning:
         """Take the decisions of a tick.
 
         Args:
-            ticks: Of each axis, with the command in force.
-            line: Components of the feet's line along the axes, (n_axes,).
-            both: Whether both feet stand; then the robot tilts about that line alone.
-            planned: Whether both are planned to. While a foot lands early or late, nothing is found.
+            memory: The memory.
+            ticks: Of each axis.
+            told: The command in force of each axis [rad/s].
+            line: Components of the feet's line along the axes.
+            both: 1 if both feet stand; then the robot tilts about that line alone.
+            planned: 1 if both are planned to. While a foot lands early or late, nothing is found.
+
+        Returns:
+            The next memory.
         """
-        if not self._time:
-            return
-        before, self._before = self._before, [self._expected(*each) for each in zip(self._models, ticks, strict=True)]
-        self._settled = where((both == self._both) & (both == planned), self._settled + self._dt, 0.0)
-        self._both = both
-        if not before:
-            return
-        free = where(self._settled > SETTLED_S, 1.0, 0.0)
+        if not self.time_s:
+            return memory
+        expected = [self._expected(*each) for each in zip(self.models, ticks, told, strict=True)]
+        settled = where((both == memory.both) & (both == planned), memory.settled + self.dt, 0.0)
+        if memory.expected is None:
+            return memory._replace(both=both, settled=settled, expected=expected)
+        free = where(settled > SETTLED_S, 1.0, 0.0)
         errors = []
-        for i, (model, tick, (x2, f2)) in enumerate(zip(self._models, ticks, before, strict=True)):
+        for i, (model, tick, (x2, f2)) in enumerate(zip(self.models, ticks, memory.expected, strict=True)):
             slope = model.gravity_torque / model.J1
-            beyond = ((tick.estimates[0][1] - x2) / self._dt - f2) / slope
-            errors.append(free * (beyond + self.lean[i] - self.bias[i] - self.known_tilt[i]))
-        about = sum(share * error for share, error in zip(line, errors, strict=True))
+            beyond = ((tick.estimates[0][1] - x2) / self.dt - f2) / slope
+            errors.append(free * (beyond + memory.lean[i] - memory.bias[i] - memory.known_tilt[i]))
+        about = dot(line, errors)
+        stand = both > 0.5
+        w = 2.0 / self.time_s
+        bias, lean, speed, seen, known_tilt = [], [], [], [], []
         for i, share in enumerate(line):
-            error = where(both, share * about, errors[i])
-            self._seen[i] = self._seen[i] + self._dt * free * where(both, share**2, 1.0)
-            averaged = clip(FIRST_S + self._seen[i], FIRST_S, LAST_S)
-            self.bias[i] = clip(self.bias[i] + self._dt / averaged * error, -MOST, MOST)
-            w = 2.0 / self._time
-            hastens = w * w * (self.bias[i] - self.lean[i]) - 2.0 * w * self._speed[i]
-            self.lean[i] = self.lean[i] + self._dt * self._speed[i]
-            self._speed[i] = self._speed[i] + self._dt * hastens
-            self.known_tilt[i] = self._fall * hastens
+            error = where(stand, share * about, errors[i])
+            seen.append(memory.seen[i] + self.dt * free * where(stand, share**2, 1.0))
+            averaged = clip(FIRST_S + seen[i], FIRST_S, LAST_S)
+            bias.append(clip(memory.bias[i] + self.dt / averaged * error, -MOST, MOST))
+            hastens = w * w * (bias[i] - memory.lean[i]) - 2.0 * w * memory.speed[i]
+            lean.append(memory.lean[i] + self.dt * memory.speed[i])
+            speed.append(memory.speed[i] + self.dt * hastens)
+            known_tilt.append(self.fall_s2 * hastens)
+        return Leaning(bias, lean, speed, seen, known_tilt, both, settled, expected)
 
     @staticmethod
-    def _expected(model: ReducedModel, tick: Tick) -> tuple[Scalar, Scalar]:
+    def _expected(model: ReducedModel, tick: Tick, u: Scalar) -> tuple[Scalar, Scalar]:
         """Return x2, and f2 with the command that is held now."""
         x1, x2, x3 = tick.estimates[0][:3]
-        return x2, model.tilt_acceleration(x1, x2, x3, tick.u)
+        return x2, model.tilt_acceleration(x1, x2, x3, u)

@@ -2,53 +2,91 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
-
-import numpy as np
+from dataclasses import dataclass
+from functools import reduce
+from operator import and_, or_
+from typing import ClassVar, NamedTuple
 
 from cmg_mj.core.arrays import Scalar, where
-from cmg_mj.core.controller import Controller
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.noise import NoiseStream
 from cmg_mj.core.sensor import steps_until
+from cmg_mj.core.straight_line import Tables
 from cmg_mj.features.gait import Gait
 
 
+class Foot(NamedTuple):
+    """The memory of a foot's switch; 1 is pressed."""
+
+    pressed: Scalar
+    """At the last tick."""
+    stands: Scalar
+    """As the controller has it."""
+    since: Scalar
+    """Ticks since the last change."""
+    late: tuple[Scalar, ...]
+    """The last readings, the newest first: so many as the delay spans."""
+    agreeing: tuple[Scalar, ...]
+    """The last delivered ones, the newest first: so many as a bounce takes, and one more."""
+
+
+@dataclass(frozen=True)
 class FootSwitches:
     """Says of each foot whether it stands, once a control tick.
 
     A switch is closed from a force on. After a change it bounces: its reading is open or closed at random for a while.
     A foot counts as changed once its readings have agreed for longer than that.
 
-    Args:
-        gait: The switches' settings.
-        first: The first axis' controller, at whose ticks they are read.
+    Attributes:
+        threshold: Force from which it is closed [N].
+        delay: Its delay in ticks.
+        bounce: Ticks for which it bounces.
     """
 
-    def __init__(self, gait: Gait, first: Controller) -> None:
-        dt = first.law.dt
-        self._threshold = gait.switch_force_n
-        self._bounces = steps_until(gait.switch_bounce_s, dt)
-        self._late: deque[np.ndarray] = deque(maxlen=1 + steps_until(gait.switch_delay_s, dt))
-        self._agreeing: deque[np.ndarray] = deque(maxlen=1 + self._bounces)
-        self._noise = normals(first.seed, first.world_ids, NoiseStream.FOOT_SWITCH, 2)
-        self._last = self._stands = self._since = np.array(0)
+    threshold: float
+    delay: int
+    bounce: int
 
-    def __call__(self, forces: Sequence[Scalar]) -> np.ndarray:
-        """Return whether each foot stands, (2,) or (2, n_worlds).
+    draws: ClassVar[dict[int, int]] = {int(NoiseStream.FOOT_SWITCH): 2}
+
+    def init(self, forces: Sequence[Scalar]) -> tuple[Foot, ...]:
+        """Return the memory, from the forces on the feet at the first tick [N]."""
+        feet = []
+        for force in forces:
+            pressed = where(force > self.threshold, 1.0, 0.0)
+            since = 0.0 * force + self.bounce
+            feet.append(Foot(pressed, pressed, since, (pressed,) * (1 + self.delay), (pressed,) * (1 + self.bounce)))
+        return tuple(feet)
+
+    def step(
+        self, feet: Sequence[Foot], forces: Sequence[Scalar], tick: int, tables: Tables
+    ) -> tuple[tuple[Foot, ...], list[Scalar]]:
+        """Read both switches: return the next memory, and 1 for each foot that stands.
 
         Args:
+            feet: The memory.
             forces: On both feet [N].
+            tick: The tick's number.
+            tables: The noise.
         """
-        pressed = np.array([force > self._threshold for force in forces])
-        if not self._late:
-            self._last = self._stands = pressed
-            self._since = np.full(pressed.shape, self._bounces)
-        self._since = np.where(pressed != self._last, 0, self._since + 1)
-        self._last = pressed
-        random = np.reshape(next(self._noise), pressed.shape) > 0.0
-        self._late.append(np.where(self._since < self._bounces, random, pressed))
-        self._agreeing.append(self._late[0])
-        shown = np.array(self._agreeing)
-        self._stands = where(shown.all(axis=0) | ~shown.any(axis=0), shown[-1], self._stands)
-        return self._stands
+        normals = tables[NoiseStream.FOOT_SWITCH](tick)
+        after = tuple(self._read(*parts) for parts in zip(feet, forces, normals, strict=True))
+        return after, [foot.stands for foot in after]
+
+    def _read(self, foot: Foot, force: Scalar, normal: Scalar) -> Foot:
+        pressed = where(force > self.threshold, 1.0, 0.0)
+        since = where(pressed != foot.pressed, 0.0, foot.since + 1.0)
+        bouncing = where(normal > 0.0, 1.0, 0.0)
+        shown = where(since < self.bounce, bouncing, pressed)
+        late = (shown, *foot.late[:-1])
+        agreeing = (late[-1], *foot.agreeing[:-1])
+        closed = [reading > 0.5 for reading in agreeing]
+        opened = [reading < 0.5 for reading in agreeing]
+        stands = where(or_(reduce(and_, closed), reduce(and_, opened)), agreeing[0], foot.stands)
+        return Foot(pressed, stands, since, late, agreeing)
+
+
+def foot_switches(gait: Gait, dt: float) -> FootSwitches:
+    """Make the switches of a gait, read every dt [s]."""
+    delay, bounce = (steps_until(time, dt) for time in (gait.switch_delay_s, gait.switch_bounce_s))
+    return FootSwitches(gait.switch_force_n, delay, bounce)

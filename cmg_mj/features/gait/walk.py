@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
 
-from cmg_mj.core.arrays import clip, dot, where
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.arrays import Scalar, clip, dot, where
+from cmg_mj.core.axis import AxisControl, Tick
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.types import MultiAxisReading, Setpoints
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.rig import AxesOrders
+from cmg_mj.core.straight_line import Tables
+from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.features.gait import Gait
-from cmg_mj.features.gait.lean import Lean
+from cmg_mj.features.gait.lean import Lean, Leaning
 from cmg_mj.features.gait.legs import SIDES, Walk, plan_walk
 from cmg_mj.features.gait.plan import Plan
-from cmg_mj.features.gait.switches import FootSwitches
+from cmg_mj.features.gait.switches import Foot, FootSwitches, foot_switches
 from cmg_mj.inputs.features import Judgement
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
@@ -94,11 +100,77 @@ def describe_gait(design: Design, plant: Plant) -> Judgement:
     return Judgement([("gait", row)], hints)
 
 
-def walking(gait: Gait, plant: Plant) -> Callable[[Controller], Walking] | None:
+def walking(gait: Gait, plant: Plant, axes: Sequence[AxisControl]) -> Walking | None:
     """Make the stage between the axes; None without steps."""
-    return (lambda first: Walking(planned(plant, gait), gait, plant, first)) if gait.steps else None
+    if not gait.steps:
+        return None
+    walk, dt = planned(plant, gait), axes[0].law.dt
+    models = [axis.reduced for axis in plant.axes]
+    lean = Lean(models, dt, gait.lean_s, walk.height / plant.gravity)
+    limits = [axis.law.rate_limit for axis in axes]
+    course = Course(walk, plant, dt, axes[0].period)
+    model = plant.filed.model
+    sensors = [model.sensor(i).name for i in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)]
+    feet = [sensors.index(f"{side}/foot") for side in SIDES]
+    return Walking(walk.servos.tolist(), feet, foot_switches(gait, dt), lean, models, limits, dt, course)
 
 
+class Course:
+    """The plan of a walk as a table: its numbers at each control tick; after its end they stay.
+
+    Args:
+        walk: The plan.
+        plant: The robot.
+        dt: Control period [s].
+        period: Physics steps in a control period.
+    """
+
+    def __init__(self, walk: Walk, plant: Plant, dt: float, period: int) -> None:
+        about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
+        across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
+        known = -walk.acceleration @ across.T / plant.gravity
+        left, right = walk.feet[:, :, :2]
+        lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None] @ about.T
+        double = (walk.plan.load(walk.time) > 0.0).all(axis=0).astype(float)
+        leaning = -walk.height * walk.leaning @ across.T
+        self._period = period
+        ticks = math.ceil(walk.time[-1] / dt) + 2
+        times = period * np.arange(ticks) * plant.timestep
+        columns = [
+            _at(lines, times),
+            (_at(double[:, None], times) >= 1.0).astype(float),
+            _at(known, times + 0.5 * dt),  # a sample is the mean since the one before
+        ]
+        for ends in (times, times + dt):
+            columns += [_at(walk.setpoints, ends), *np.moveaxis(_at(leaning, ends), 2, 0)]
+        self._rows = np.hstack(columns)
+
+    def __call__(self, step: int) -> list[float]:
+        """Return the numbers at a physics step.
+
+        The line of the feet (2), whether both stand (1), the known tilt (2); of now, and of the next tick: setpoints
+        (6), and by how much each moves with the lean about the first axis (6) and about the second one (6).
+        """
+        return self._rows[min(step // self._period, len(self._rows) - 1)].tolist()
+
+
+def _at(table: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Read a table of the plan, (n_points, ...), at times [s]; after its end it stays."""
+    i = np.minimum((times / PLAN_S + 1e-9).astype(int), len(table) - 2)
+    part = np.minimum(times / PLAN_S - i, 1.0).reshape(-1, *[1] * (table.ndim - 1))
+    return (1.0 - part) * table[i] + part * table[i + 1]
+
+
+class WalkMemory(NamedTuple):
+    """The memory of `Walking`."""
+
+    tick: int
+    """Ticks taken."""
+    feet: tuple[Foot, ...]
+    leaning: Leaning
+
+
+@dataclass(frozen=True)
 class Walking:
     """Moves the legs by the plan, and turns the gimbals of both axes as the feet allow.
 
@@ -108,64 +180,86 @@ class Walking:
 
     The torso's planned acceleration a makes accelerometers show a tilt of -a/g, which is taken off. The setpoints of
     the legs' servos run straight from tick to tick: their controls are the rates (`<intvelocity>`).
+
+    Attributes:
+        actuators: The legs' servos.
+        feet: Which of the touch sensors are the feet's.
+        switches: The foot switches.
+        lean: Finds the equilibrium bias, and moves the torso.
+        models: The reduced model of each axis.
+        limits: Largest gimbal rate of each axis [rad/s].
+        dt: Control period [s].
+        course: The plan.
     """
 
-    def __init__(self, walk: Walk, gait: Gait, plant: Plant, first: Controller) -> None:
-        self._walk, self._dt = walk, first.law.dt
-        self._switches = FootSwitches(gait, first)
-        model = plant.filed.model
-        sensors = [model.sensor(i).name for i in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)]
-        self._feet = [sensors.index(f"{side}/foot") for side in SIDES]
-        self._models = [axis.reduced for axis in plant.axes]
-        about = np.array([axis.direction[:2] for axis in plant.axes])  # the torso is level
-        across = np.array([np.cross(axis.direction, axis.up)[:2] for axis in plant.axes])
-        self._known = -walk.acceleration @ across.T / plant.gravity
-        left, right = walk.feet[:, :, :2]
-        self._lines = (left - right) / np.linalg.norm(left - right, axis=1)[:, None] @ about.T
-        self._double = (walk.plan.load(walk.time) > 0.0).all(axis=0).astype(float)
-        self._leaning = -walk.height * walk.leaning @ across.T
-        zero = 0.0 if isinstance(first.world_ids, int) else np.zeros(len(first.world_ids))
-        self._lean = Lean(self._models, self._dt, gait.lean_s, walk.height / plant.gravity, zero)
+    actuators: Sequence[int]
+    feet: Sequence[int]
+    switches: FootSwitches
+    lean: Lean
+    models: Sequence[ReducedModel]
+    limits: Sequence[Scalar]
+    dt: float
+    course: Course
 
-    def __call__(self, controllers: Sequence[Controller], ideals: MultiAxisReading) -> Setpoints:
+    draws: ClassVar[Mapping[int, int]] = FootSwitches.draws
+
+    @property
+    def tables(self) -> dict[str, Course]:
+        """See `AxesStage`."""
+        return {"walk": self.course}
+
+    def init(self, readings: MultiAxisReading, tables: Tables) -> WalkMemory:
+        """Return the memory before the first tick."""
+        forces = [readings.touch[i] for i in self.feet]
+        return WalkMemory(0, self.switches.init(forces), self.lean.init(0.0 * forces[0]))
+
+    def step(
+        self,
+        memory: WalkMemory,
+        step: int,
+        orders: AxesOrders,
+        ticks: Sequence[Tick],
+        readings: MultiAxisReading,
+        tables: Tables,
+    ) -> tuple[WalkMemory, AxesOrders]:
         """Turn the gimbals, move the legs, and tell the controllers what they will know at the next tick."""
-        dt, time = self._dt, (controllers[0].step or 0) * controllers[0].timestep
-        left, right = self._switches([ideals.touch[i] for i in self._feet])
-        both = left & right
-        line = self._at(self._lines, time)
-        across = np.array([-line[1], line[0]])
-        ticks = [part.tick for part in controllers if part.tick is not None]
-        held = dot(line.tolist(), [tick.u for tick in ticks])
-        back = -dot(across.tolist(), [tick.y2 for tick in ticks]) / RECENTRED_S
-        for i, part in enumerate(controllers):
-            limit = part.law.rate_limit
-            u = clip(where(both, line[i] * held + across[i] * back, ticks[i].u), -limit, limit)
-            part.tick = ticks[i] = ticks[i]._replace(u=u)
-        caught = []
-        for model, tick in zip(self._models, ticks, strict=True):
+        course = tables["walk"](step)
+        line, (planned, *known), ends = course[:2], course[2:5], (course[5:23], course[23:])
+        across = [-line[1], line[0]]
+        forces = [readings.touch[i] for i in self.feet]
+        feet, (left, right) = self.switches.step(memory.feet, forces, memory.tick, tables)
+        both = left * right
+        stand = both > 0.5
+        held = dot(line, orders.told)
+        back = -dot(across, [tick.y2 for tick in ticks]) / RECENTRED_S
+        told, caught = [], []
+        for i, tick in enumerate(ticks):
+            limit = self.limits[i]
+            u = clip(where(stand, line[i] * held + across[i] * back, orders.told[i]), -limit, limit)
             x1, x2, x3 = tick.estimates[0][:3]
-            caught.append(model.tilt_acceleration(x1, x2, x3, tick.u) + x2 / CAUGHT_S)
-        contact = where(both, -dot(across.tolist(), caught), 0.0)
-        before = self._lean.lean.copy()
-        self._lean.update(ticks, line, both, bool(self._at(self._double, time) >= 1.0))
-        known = self._at(self._known, time + 0.5 * dt)  # a sample is the mean since the one before
-        for i, part in enumerate(controllers):
-            part.known_tilt = known[i] + self._lean.known_tilt[i]
-            part.bias = self._lean.bias[i] - self._lean.lean[i]
-            part.contact = across[i] * contact
-            part.command_rate(ticks[i].u)
-        return self._walk.servos.tolist(), self._legs(time, before, self._lean.lean)
+            told.append(u)
+            caught.append(self.models[i].tilt_acceleration(x1, x2, x3, u) + x2 / CAUGHT_S)
+        contact = where(stand, -dot(across, caught), 0.0)
+        leaning = self.lean.step(memory.leaning, ticks, told, line, both, planned)
+        knowing = []
+        for i, before in enumerate(orders.known):
+            tilt = known[i] + leaning.known_tilt[i]
+            bias = leaning.bias[i] - leaning.lean[i]
+            knowing.append(
+                before._replace(tilt=before.tilt + tilt, bias=before.bias + bias, contact=across[i] * contact)
+            )
+        legs = self._legs(ends, memory.leaning.lean, leaning.lean)
+        after = WalkMemory(memory.tick + 1, feet, leaning)
+        return after, AxesOrders(told, told, knowing, [*orders.setpoints, *legs])
 
-    def _legs(self, time: float, before: Sequence[float], after: Sequence[float]) -> np.ndarray:
-        """Return the rates at which the servos' setpoints run until the next tick, (6,) or (6, n_worlds)."""
-        ends = []
-        for at, leans in ((time, before), (time + self._dt, after)):
-            moved = map(np.multiply.outer, leans, self._at(self._leaning, at).T)
-            ends.append(sum(moved, self._at(self._walk.setpoints, at)))
-        return ((ends[1] - ends[0]) / self._dt).T
-
-    def _at(self, table: np.ndarray, time: float) -> np.ndarray:
-        """Read a table of the plan at a time [s]; after its end it stays."""
-        i = min(int(time / PLAN_S + 1e-9), len(table) - 2)
-        part = min(time / PLAN_S - i, 1.0)
-        return (1.0 - part) * table[i] + part * table[i + 1]
+    def _legs(self, ends: Sequence[Sequence[float]], before: Sequence[Scalar], after: Sequence[Scalar]) -> list[Scalar]:
+        """Return the rates at which the servos' setpoints run until the next tick."""
+        rates = []
+        n = len(self.actuators)
+        for i in range(n):
+            begin, end = (
+                plan[i] + lean[0] * plan[n + i] + lean[1] * plan[2 * n + i]
+                for plan, lean in zip(ends, (before, after), strict=True)
+            )
+            rates.append((end - begin) / self.dt)
+        return rates

@@ -144,6 +144,7 @@ class PivotSignals:
 
     edges: Collection[int] = ()
     accelerates = True
+    actuators: Sequence[int] = ()
 
     def __init__(
         self,
@@ -165,6 +166,6 @@ class PivotSignals:
             total = [part + along * acceleration for part, along in zip(total, direction, strict=True)]
         return total
 
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
-        """Set the acceleration: see `Disturbance`."""
-        return outside._replace(acceleration=self.mean(step * self._timestep, (step + steps) * self._timestep))
+    def at(self, step: int, steps: int) -> Outside:
+        """Return the acceleration: see `Disturbance`."""
+        return Outside(acceleration=self.mean(step * self._timestep, (step + steps) * self._timestep))

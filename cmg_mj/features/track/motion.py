@@ -148,15 +148,15 @@ class TrackMotion:
         self._timestep = float(model.opt.timestep)
         self._files = [(track.start_s, read_columns(track.file)) for track in tracks]
         names = [name for _, columns in self._files for name in columns.names]
-        self._actuators = [element_id(model, "actuator", name) for name in names]
-        self._integrates = model.actuator_dyntype[self._actuators] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+        self.actuators = [element_id(model, "actuator", name) for name in names]
+        self._integrates = model.actuator_dyntype[self.actuators] == mujoco.mjtDyn.mjDYN_INTEGRATOR
 
-    def __call__(self, step: int, steps: int, outside: Outside) -> Outside:
+    def at(self, step: int, steps: int) -> Outside:
         """See `Disturbance`."""
         h = self._timestep
         start, middle, end = (self._setpoints(at * h) for at in (step, step + 0.5 * steps, step + steps))
         controls = np.where(self._integrates, (end - start) / (steps * h), middle)
-        return outside._replace(setpoints=(self._actuators, controls))
+        return Outside(setpoints=(self.actuators, controls))
 
     def _setpoints(self, time: float) -> np.ndarray:
         return np.array(
