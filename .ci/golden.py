@@ -169,10 +169,10 @@ def cases() -> dict[str, tuple[str, dict, dict]]:
     for name, (scenario, settings, options) in list(table.items()):
         if options.get("driver") != "callback":
             table[f"unrounded: {name}"] = scenario, {**settings, **UNROUNDED}, options
-    walk = {"controller.compensate_turning": False, "duration_s": 8.0}
+    walk = {"controller.compensate_turning": False, "gait.steps": 4, "duration_s": 9.0}
     case("walk, turn not compensated", walk, "walk")
     case("walk, turn not compensated, 3 worlds", walk, "walk", **WORLDS)
-    tiles = {**walk, "gait.tiles_m": 0.002, "gait.lean_s": 1.0, "plant.equilibrium_bias_deg": 0.25}
+    tiles = {**walk, "gait.tiles_m": 0.002, "plant.equilibrium_bias_deg": 0.25}
     case("unrounded: walk, turn not compensated, tiles", {**tiles, **UNROUNDED}, "walk")
     case("unrounded: walk, turn not compensated, tiles, 3 worlds", {**tiles, **UNROUNDED}, "walk", **WORLDS)
     robots = {

@@ -2,9 +2,8 @@
 
 __all__: list[str]
 
-from .core.axes import MultiAxisController as MultiAxisController
+from .core.axis import Tick as Tick
 from .core.controller import Controller as Controller
-from .core.controller import Tick as Tick
 from .core.errors import InputError as InputError
 from .core.errors import RunStopped as RunStopped
 from .core.reduced_model import ReducedModel as ReducedModel

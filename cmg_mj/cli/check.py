@@ -16,7 +16,7 @@ from cmg_mj.linear.verdict import IN_THE_MODEL, NOT_IN_THE_MODEL, hints, judge_g
 from cmg_mj.observers.gyro_free import steady_error
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.reports import assignments, lines, number
-from cmg_mj.runs.experiment import Experiment
+from cmg_mj.runs.experiment import ExperimentAxis
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.resolve import resolved
 from cmg_mj.scenario.schema import ControllerSettings
@@ -24,7 +24,7 @@ from cmg_mj.scenario.schema import ControllerSettings
 OWN_CODE = "your own code, which was imported and tried on two samples"
 
 
-def description(name: str, part: Experiment) -> str:
+def description(name: str, part: ExperimentAxis) -> str:
     """Describe a scenario in the lines that `cmg-mj check` prints.
 
     Args:
@@ -123,7 +123,7 @@ def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple
         yield "", OWN_CODE
 
 
-def rig_description(name: str, part: Experiment, own: str = "") -> str:
+def rig_description(name: str, part: ExperimentAxis, own: str = "") -> str:
     """Describe a model file in the lines that `cmg-mj check` prints.
 
     Args:

@@ -73,8 +73,10 @@ class CommandStage(Protocol):
 class MemoryStage(Protocol):
     """An effect on the law's memory before its step; it has no memory of its own."""
 
-    until: int
-    """The physics step from which on it does nothing."""
+    @property
+    def until(self) -> int:
+        """The physics step from which on it does nothing."""
+        ...
 
     def __call__(self, step: int, estimate: Sequence[Scalar], memory: State) -> State:
         """Return the law's memory: physics step, the estimate in the loop, memory."""

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.axis import AxisControl, Sampled, Tick
+from cmg_mj.core.axis import AxisControl, Delivered, Sampled, Tick
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import Normals
 from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding, ideals_of
 from cmg_mj.core.straight_line import Tables, straight_line
-from cmg_mj.core.types import Law, Observer, Setpoints
+from cmg_mj.core.types import Forces, Law, Observer, Setpoints
 
 _new = tuple.__new__
 
@@ -163,13 +163,8 @@ class Controller:
             self.sample(step, readings)
             return False
         state = self.state
-        arguments = state.sampled, state.deciding, step, readings, self._tables
-        run = self._straight(self.rig.update, step, arguments, _shown)
-        try:
-            result = run(*arguments)
-        except (ArithmeticError, ValueError):
-            result = self.rig.update(*arguments)
-        self.state = _new(ControllerState, (step, readings, *result))
+        decided = self._decided(state.sampled, state.deciding, step, readings)
+        self.state = _new(ControllerState, (step, readings, *decided))
         return True
 
     def sample(self, step: int, readings: Readings) -> None:
@@ -183,6 +178,38 @@ class Controller:
             sampled = self.rig.sample(*arguments)
         self.state = _new(ControllerState, (step, readings, sampled, *state[3:]))
 
+    def decide(
+        self,
+        step: int,
+        forces: Forces,
+        encoders: Sequence[Scalar],
+        fog: Scalar,
+        rate: Scalar,
+        gyro: Scalar = math.nan,
+    ) -> Tick:
+        """Take the control decision of a tick from samples that others have taken, with a rig of one axis.
+
+        Args:
+            step: Number of the physics step.
+            forces: Specific force: inner x, inner z, outer x, outer z [m/s^2].
+            encoders: Gimbal angles, one a gimbal [rad].
+            fog: The gyro's rate [rad/s].
+            rate: The true one, where that is fed back [rad/s].
+            gyro: Reading of the cheap gyro, where an observer needs it [rad/s].
+
+        Returns:
+            The tick, which counts as the last one from now on.
+
+        Raises:
+            RunStopped: The observer or the law failed, or returned a number that is not finite.
+        """
+        (axis,) = self.rig.axes
+        before = None if self.state.deciding is None else self.state.deciding.axes[0]
+        deciding, tick = axis.decide(before, step, Delivered(forces, encoders, fog, gyro), rate)
+        after, decision = self.rig.drive([deciding], (), step, [tick], self.state.readings, self._tables)
+        self.state = self.state._replace(step=step, deciding=after, decision=decision)
+        return tick
+
     def overrule(self, ticks: Sequence[Tick]) -> None:
         """Take ticks that have been decided elsewhere in the place of the last ones; observers hear their commands."""
         deciding, decision = self.state.deciding, self.state.decision
@@ -192,6 +219,17 @@ class Controller:
         self.state = self.state._replace(
             deciding=deciding._replace(axes=tuple(axes)), decision=decision._replace(ticks=tuple(ticks))
         )
+
+    def _decided(
+        self, sampled: tuple[Sampled, ...], deciding: RigDeciding | None, step: int, readings: Readings
+    ) -> tuple[tuple[Sampled, ...], RigDeciding, Decision]:
+        """Take samples and decisions: see `RigControl.update`. What decides elsewhere does so here."""
+        arguments = sampled, deciding, step, readings, self._tables
+        run = self._straight(self.rig.update, step, arguments, _shown)
+        try:
+            return run(*arguments)
+        except (ArithmeticError, ValueError):
+            return self.rig.update(*arguments)
 
     def _straight(
         self,

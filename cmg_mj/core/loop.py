@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from itertools import chain, pairwise
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import Tick
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.errors import InputError
 from cmg_mj.core.rig import Readings
 from cmg_mj.core.types import Setpoints
 
@@ -29,7 +30,7 @@ class Outside(NamedTuple):
 class Disturbance(Protocol):
     """Something that acts from outside: a function of the physics step."""
 
-    edges: Collection[int] = ()
+    edges: Sequence[int] = ()
     """Physics steps that become instants."""
     accelerates: bool = False
     """Whether it accelerates the pivot: gravity of the plant's model then changes."""
@@ -63,21 +64,17 @@ def acting(disturbances: Sequence[Disturbance], step: int, steps: int) -> Outsid
     return Outside(torques[0] if torques else None, acceleration, setpoints)
 
 
-def instants(end: int, grid: int, edges: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
-    """Find the physics steps at which a sensor or the controller is due, or a disturbance has an edge.
+def next_instant(step: int, grid: int, edges: Sequence[int]) -> int:
+    """Return the next physics step at which a sensor or the controller is due, or a disturbance has an edge.
 
     Args:
-        end: Number of the last step's end.
+        step: Number of the physics step.
         grid: Physics steps between the instants at which a sensor or the controller may be due.
-        edges: Steps that are instants beside.
-
-    Yields:
-        The step, and the steps until the next instant.
+        edges: Steps that are instants beside, in order.
     """
-    for start, last in pairwise(sorted({0, end, *(step for step in edges if step < end)})):
-        for stop in chain(range((start // grid + 1) * grid, last, grid), (last,)):
-            yield start, stop - start
-            start = stop
+    due = (step // grid + 1) * grid
+    place = bisect_right(edges, step)
+    return min(due, edges[place]) if place < len(edges) else due
 
 
 Joints = Sequence[Scalar] | np.ndarray
@@ -211,49 +208,65 @@ class ControlLoop:
         disturbances: Sequence[Disturbance],
         fall_angle: float,
     ) -> None:
+        moved = [actuator for one in disturbances for actuator in one.actuators]
+        if both := set(controller.rig.actuators).intersection(moved):
+            raise InputError(
+                f"actuator {min(both)}: is moved by a stage between the axes and from outside; leave one out"
+            )
         self.physics = physics
         self.controller = controller
         self.step = 0
         self.readings: Any = None
         self.endings: dict[int, Ending] = {}
-        self._end, self._disturbances = end, disturbances
+        self._disturbances = disturbances
+        self._edges = sorted({end, *(edge for one in disturbances for edge in one.edges if edge < end)})
+        self._end = end
         self._fall_angle = fall_angle
-        self._steps = 0
+        self._next = 0
+        self._held: Sequence[Scalar] = [0.0] * len(controller.axes)
+        self._torques = physics.push(self._held)
 
     def ticks(self) -> Iterator[ControlTick]:
         """Go from control tick to control tick, until the instants or the running worlds are at their end."""
-        physics, fall_angle = self.physics, self._fall_angle
-        steps_per_sample, period = self.controller.steps_per_sample, self.controller.period
-        state, tilt, stop_fallen = physics.state, physics.tilt, physics.stop_fallen
-        disturbances = self._disturbances
-        held: Sequence[Scalar] = [0.0] * len(self.controller.axes)
-        torques = physics.push(held)
-        edges = [edge for disturbance in disturbances for edge in disturbance.edges]
-        for step, steps in instants(self._end, steps_per_sample, edges):
-            self.step, self._steps = step, steps
-            if disturbances:
-                about, acceleration, setpoints = acting(disturbances, step, steps)
-                if acceleration is not None:
-                    physics.accelerate(acceleration)
-                if setpoints is not None:
-                    physics.control(*setpoints)
-                if about is not None and about is not held:
-                    held = about
-                    torques = physics.push(held)
-            q, v = state()
-            for world, angle in stop_fallen(tilt(q), fall_angle):
+        return iter(self.next_tick, None)
+
+    def next_tick(self) -> ControlTick | None:
+        """Go to the next control tick; None at the end."""
+        physics, controller = self.physics, self.controller
+        grid, period = controller.steps_per_sample, controller.period
+        while self._next < self._end:
+            self.step = step = self._next
+            self._next = next_instant(step, grid, self._edges)
+            steps = self._next - step
+            self._act(step, steps)
+            q, v = physics.state()
+            for world, angle in physics.stop_fallen(physics.tilt(q), self._fall_angle):
                 self.endings[world] = Ending(step, angle)
             if not physics.any_running:
-                return
-            if step % steps_per_sample == 0:
+                self._next = self._end
+                return None
+            if step % grid == 0:
                 if self.takes_samples:
                     self.readings = physics.reading(v)
                 if step % period == 0:
-                    yield _new(ControlTick, (step, steps, q, v, torques))
-                    continue
+                    return _new(ControlTick, (step, steps, q, v, self._torques))
                 if self.takes_samples:
-                    self.controller.sample(step, self.readings)
+                    controller.sample(step, self.readings)
             physics.advance(steps)
+        return None
+
+    def _act(self, step: int, steps: int) -> None:
+        """Let the disturbances act until the next instant."""
+        if not self._disturbances:
+            return
+        torques, acceleration, setpoints = acting(self._disturbances, step, steps)
+        if acceleration is not None:
+            self.physics.accelerate(acceleration)
+        if setpoints is not None:
+            self.physics.control(*setpoints)
+        if torques is not None and torques is not self._held:
+            self._held = torques
+            self._torques = self.physics.push(torques)
 
     def decide(self) -> None:
         """Let the controller decide, and command the servos."""
@@ -270,4 +283,4 @@ class ControlLoop:
 
     def advance(self) -> None:
         """Take the physics to the next instant."""
-        self.physics.advance(self._steps)
+        self.physics.advance(self._next - self.step)

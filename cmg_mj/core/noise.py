@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from enum import IntEnum, unique
 from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class Normals:
         self._channels = channels
         self._starts = [self._positions()]
         self._number = -1
-        self._block: Sequence[Sequence[Scalar]] = ()
+        self._block: Any = ()
 
     def __call__(self, sample: int) -> Sequence[Scalar]:
         """Return the numbers of a sample: `channels` floats, or an array (channels, n_worlds)."""
@@ -81,7 +82,7 @@ class Normals:
             self._number = number
         return self._block[sample % BLOCK]
 
-    def _block_of(self, number: int) -> Sequence[Sequence[Scalar]]:
+    def _block_of(self, number: int) -> Any:
         first = min(number, len(self._starts) - 1)
         drawn = np.empty(0)
         for earlier in range(first, number + 1):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Deciding, Known, Sampled, Tick, require_one_period
@@ -35,19 +35,27 @@ class AxesOrders(NamedTuple):
     """Controls of the stages' `actuators`, one after the other."""
 
 
-class AxesStage(Protocol):
+class AxesStage:
     """An effect between the axes, after their decisions, once a control tick. Stages act one after the other."""
 
-    actuators: Sequence[int]
-    """Actuators beside the gimbals that it moves."""
-    draws: Mapping[int, int]
-    """Number of a noise stream -> normals that a tick takes of it."""
-    tables: Mapping[Any, Callable[[int], Sequence[float]]]
-    """What it looks up by the physics step: key -> function."""
+    @property
+    def actuators(self) -> Sequence[int]:
+        """Actuators beside the gimbals that it moves."""
+        return ()
+
+    @property
+    def draws(self) -> Mapping[int, int]:
+        """Number of a noise stream -> normals that a tick takes of it."""
+        return {}
+
+    @property
+    def tables(self) -> Mapping[Any, Callable[[int], Sequence[float]]]:
+        """What it looks up by the physics step: key -> function."""
+        return {}
 
     def init(self, readings: MultiAxisReading, tables: Tables) -> Memory:
         """Return the memory before the first tick, from the readings there."""
-        ...
+        return ()
 
     def step(
         self,
@@ -71,7 +79,7 @@ class AxesStage(Protocol):
         Returns:
             The next memory, and the orders.
         """
-        ...
+        return memory, orders
 
 
 class RigDeciding(NamedTuple):

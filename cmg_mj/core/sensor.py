@@ -73,13 +73,12 @@ class Site(NamedTuple):
 
 
 class SensorStage:
-    """An effect on a sensor's signal: by default none, and without memory.
+    """An effect on a sensor's signal: by default none, and without memory."""
 
-    Attributes:
-        draws: Number of a noise stream -> normals that a sample takes of it.
-    """
-
-    draws: Mapping[int, int] = {}
+    @property
+    def draws(self) -> Mapping[int, int]:
+        """Number of a noise stream -> normals that a sample takes of it."""
+        return {}
 
     def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
         """Return the memory before the first sample."""

@@ -100,7 +100,8 @@ class _Recorder:
         pattern = f"({', '.join(patterns)},)"
         if type(tree) in (tuple, list):
             return pattern, type(tree)(parts)
-        made = tuple.__new__(type(tree), parts)
+        kind: Any = type(tree)
+        made = tuple.__new__(kind, parts)
         if more := getattr(tree, "__dict__", {}):
             whole = self._name("y")
             self.lines.append(f"{pattern} = {whole}")

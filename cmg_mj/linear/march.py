@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from cmg_mj.core.controller import KnownPlant
+from cmg_mj.core.axis import KnownPlant
 from cmg_mj.core.tilt import GimbalAngle
 from cmg_mj.core.types import IdealReading
 from cmg_mj.linear.plant import LinearPlant

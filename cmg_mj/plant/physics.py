@@ -26,9 +26,10 @@ class OneWorld:
     running = None
     stop_failed = None
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: Plant, data: mujoco.MjData | None = None) -> None:
+        self._plant = plant
         self.model = plant.model
-        self.data = plant.new_data()
+        self.data = plant.new_data() if data is None else data
         self._qpos, self._qvel, self._sensordata = self.data.qpos, self.data.qvel, self.data.sensordata
         self._ctrl, self._applied = self.data.ctrl, self.data.qfrc_applied
         self._forward = partial(mujoco.mj_forward, self.model, self.data)
@@ -38,6 +39,10 @@ class OneWorld:
         self._lines = [axis.line for axis in plant.axes]
         self.axis_names = plant.axis_names
         self.tilt, self._ideal = plant.largest_tilt, plant.ideal_readings
+
+    def __reduce__(self) -> tuple:
+        """Copy and pickle plant and data, which all else looks into."""
+        return OneWorld, (self._plant, self.data)
 
     def state(self) -> State:
         """Read joint angles and rates as floats."""

@@ -146,6 +146,25 @@ class Experiment:
         ]
         return Controller(controls, self.between(controls), seed=self.scenario.seed, world_ids=world_ids)
 
+    def axis_controller(
+        self, what: str = "one controller", world_ids: int | Sequence[int] = 0, observer: Observer | None = None
+    ) -> Controller:
+        """Make a fresh controller of the only axis.
+
+        Args:
+            what: The operation that takes one axis, for the message.
+            world_ids: The number of one world, or the numbers of many.
+            observer: Instead of the scenario's.
+
+        Returns:
+            The controller.
+
+        Raises:
+            InputError: The plant has several axes.
+        """
+        self.require_single_axis(what)
+        return self.controller(world_ids, observer)
+
     def between(self, controls: Sequence[AxisControl]) -> list[AxesStage]:
         """Make the stages between the axes, from the controls of the axes; none for a single one."""
         if len(controls) == 1:
@@ -386,13 +405,14 @@ class Experiment:
         Raises:
             InputError: The rig has several.
         """
-        if len(self.axes) > 1:
+        only, *others = self.axes
+        if others:
             names = self.plant.axis_names
             several = f"{self.plant.path}: tilts about several axes ({', '.join(names)}), and {what} takes one"
             if not isinstance(self.plant.axes[-1].line, HingeLine):
                 raise InputError(several)
             raise InputError(f'{several}; lock the others, as with --set plant.locked_axes=["{names[-1]}"]')
-        return self.axes[0]
+        return only
 
     def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
         """Make the closed loop, with the observer in it, a linear system for python-control.

@@ -75,7 +75,7 @@ def _batches(jobs: Sequence[BatchJob]) -> Iterator[list[int]]:
 def _shared_key(job: BatchJob) -> Hashable:
     """Return the key that jobs of one batch share; None for a job that cannot share a batch."""
     first = job.experiments[0]
-    if first.several or len({one.batch_key for one in job.experiments}) > 1:
+    if len(first.axes) > 1 or first.scenario.axes or len({one.batch_key for one in job.experiments}) > 1:
         return None
     key = tuple(part for part in first.batch_key if not part[1])
     observer = first.design.observer()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 from cmg_mj.core.arrays import Scalar, clip, cos, dot, sin, where
 from cmg_mj.core.axis import AxisControl, Tick
-from cmg_mj.core.rig import AxesOrders
+from cmg_mj.core.rig import AxesOrders, AxesStage
 from cmg_mj.core.sensor import Memory, SensorStage
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import MultiAxisReading
@@ -43,7 +43,7 @@ class YawCoupling(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Turning:
+class Turning(AxesStage):
     """Cancels the torques that reach an axis from the others while the rig turns about the vertical at w.
 
     The momenta of axis j, its wheels' and its tilt's, are swept round with the rig. This takes a torque, which acts
@@ -67,9 +67,6 @@ class Turning:
     gyro: SensorStage
     limits: Sequence[Scalar]
     feedback: Sequence[str]
-
-    actuators: ClassVar[Sequence[int]] = ()
-    tables: ClassVar[Mapping[Any, Any]] = {}
 
     @property
     def draws(self) -> Mapping[int, int]:

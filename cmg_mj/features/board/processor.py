@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, NamedTuple, Protocol, Unpack
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import Controller, KnownPlant, Tick
+from cmg_mj.core.axis import AxisControl
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.runners import as_estimate
-from cmg_mj.core.types import Forces, Law, Measurement, Observer, reads_gyro
+from cmg_mj.core.rig import Readings
+from cmg_mj.core.types import Measurement, Observer, as_estimate, reads_gyro
 from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.runs.simulate import SimulationOptions
@@ -82,63 +82,46 @@ class ProcessorController(Controller):
 
     Args:
         processor: Takes the decisions.
-        observer: The observer that the processor runs.
-        law: The law that it runs.
-        sensors: What stands between the ideal readings and the processor.
-        plant: The controller's knowledge of the plant.
-        **options: Those of `Controller`.
+        axis: The control with the observer and the law that it runs.
+        seed: Seed of the sensors' noise.
+        world: The world's number.
     """
 
-    def __init__(
-        self,
-        processor: Processor,
-        observer: Observer,
-        law: Law,
-        sensors: Any,
-        plant: KnownPlant,
-        **options: Any,
-    ) -> None:
-        refuse_gyro(observer)
+    def __init__(self, processor: Processor, axis: AxisControl, seed: int = 0, world: int = 0) -> None:
+        refuse_gyro(axis.observer)
         self.processor = processor
-        self._remote = _RemoteObserver(observer)
-        super().__init__(self._remote, law, sensors, plant, **options)
-        self.observer = observer
+        self._remote = _RemoteObserver(axis.observer)
+        remote = dataclasses.replace(axis, observers=(self._remote, *axis.observers[1:]))
+        super().__init__([remote], seed=seed, world_ids=world)
+        processor.start()
 
     def reset(self) -> None:
         """Forget everything, the processor too."""
         super().reset()
         self.processor.start()
 
-    def decide(
-        self,
-        step: int,
-        forces: Forces,
-        encoders: Sequence[Scalar],
-        fog: Scalar,
-        rate: Scalar,
-        gyro: Scalar = math.nan,
-    ) -> Tick:
-        """Let the processor decide on the samples that have been delivered; see `Controller.decide`."""
+    def _decided(self, sampled: Any, deciding: Any, step: int, readings: Readings) -> Any:
+        """Let the processor decide on the samples that have been delivered."""
+        (axis,) = self.rig.axes
+        time = step * axis.timestep
+        sampled = self.rig.sample(sampled, step, readings, self._tables)
+        delivered = axis.delivered(sampled[0], step)
         try:
-            decision = self.processor.update(tuple(forces), encoders)
+            decision = self.processor.update(tuple(delivered.forces), delivered.encoders)
         except RunStopped as error:
-            raise RunStopped(f"{error}, at t = {step * self.timestep:g} s") from error
+            raise RunStopped(f"{error}, at t = {time:g} s") from error
         self._remote.estimate = decision.estimate
-        is_first = self.tick is None
-        tick = super().decide(step, forces, encoders, fog, rate, gyro)
-        trim = trim_of(self)
+        axes, (tick,) = self.rig.decide(sampled, deciding, step, readings)
+        trim = trim_of(axis)
         trimmed = step < trim.until
         x_e = trim.gain * decision.estimate[trim.part] if trimmed else decision.x_e
-        if is_first and not trimmed and tick.x_e:  # the processor's law has begun in this update
+        if deciding is None and not trimmed and tick.x_e:  # the processor's law has begun in this update
             x_e = tick.x_e
         if not math.isfinite(decision.u) or (math.isfinite(tick.x_e) and not math.isfinite(x_e)):
-            raise RunStopped(
-                f"the processor answered u = {decision.u:g}, x_e = {x_e:g} at t = {step * self.timestep:g} s"
-            )
-        self.tick = tick._replace(
-            u=decision.u, x_e=x_e, estimates=[as_estimate(decision.estimate), *tick.estimates[1:]]
-        )
-        return self.tick
+            raise RunStopped(f"the processor answered u = {decision.u:g}, x_e = {x_e:g} at t = {time:g} s")
+        estimates = [as_estimate(decision.estimate), *tick.estimates[1:]]
+        tick = tick._replace(u=decision.u, x_e=x_e, estimates=estimates)
+        return sampled, *self.rig.drive(axes, (), step, (tick,), readings, self._tables)
 
 
 def run_on(
@@ -152,7 +135,8 @@ def run_on(
         world: The world's number.
         **options: Those of `simulate`.
     """
-    controller = experiment.axis_controller(int(world), make=partial(ProcessorController, processor))
+    (axis,) = experiment.axis_controller().axes
+    controller = ProcessorController(processor, axis, experiment.scenario.seed, int(world))
     return experiment.simulate(experiment.plant, controller, **options)
 
 
@@ -160,6 +144,5 @@ def run_on_a_board(experiment: Experiment, world: int = 0, **options: Unpack[Sim
     """Run one world on an emulated board: `run --driver board`."""
     from cmg_mj.features.board import on_a_board
 
-    experiment.require_single_axis("the board")
-    with on_a_board(experiment.axis_controller()) as board:
+    with on_a_board(experiment.axis_controller("the board")) as board:
         return dataclasses.replace(run_on(experiment, board, world, **options), driver="board")

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Literal
 from cmg_mj.core.errors import InputError, raised
 
 if TYPE_CHECKING:
+    from cmg_mj.core.axis import AxisControl
     from cmg_mj.core.controller import Controller
     from cmg_mj.features.export.pipeline import Code
     from cmg_mj.results.folder import RunFolder
@@ -51,11 +52,14 @@ def export(
         InputError: The controller cannot be exported, the C differs from Python, CasADi is missing, or the folder
             cannot be written.
     """
-    return write_code(out, generate_code(controller, precision, name))
+    control, *others = controller.axes
+    if others:
+        raise InputError(f"export: a controller of {len(controller.axes)} axes; it takes one")
+    return write_code(out, generate_code(control, precision, name))
 
 
 def generate_code(
-    controller: Controller, precision: Literal["double", "single"], name: str | None = None, suffix: str = ""
+    controller: AxisControl, precision: Literal["double", "single"], name: str | None = None, suffix: str = ""
 ) -> Code:
     """Generate a controller's C and compare it with Python, as `export` does, without writing it.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import casadi
 
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.features.export.c_code import Precision, body, literal
 from cmg_mj.features.export.constants import Constant, Constants, class_path, format_header_comment
 from cmg_mj.features.export.names import estimate_places
@@ -53,7 +53,7 @@ class CodePrinter:
         name: Prefix of everything in C.
     """
 
-    controller: Controller
+    controller: AxisControl
     traced: Traced
     constants: Constants
     precision: Precision

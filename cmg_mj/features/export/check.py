@@ -8,13 +8,14 @@ import re
 import shlex
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import casadi
 import numpy as np
 
 from cmg_mj.core.arrays import clip
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl, Delivered
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.types import STATE_SIGNALS, reads_gyro
 from cmg_mj.features.export.c_code import Precision
@@ -38,7 +39,7 @@ GRAVITY = 9.81
 GYRO_OFFSET = 0.35
 
 
-def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarray:
+def signals(controller: AxisControl, seed: int, precision: Precision) -> np.ndarray:
     """Simulate sensors of a restless rig: the tilt swings, the gimbals wander, both with noise; then all rest.
 
     Args:
@@ -56,9 +57,9 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     swings = size / 3.0 * np.sin(np.outer(t, w) + phase)
     tilt, acceleration = swings.sum(axis=1), (-(w**2) * swings).sum(axis=1)
     x, z = -GRAVITY * np.sin(tilt), GRAVITY * np.cos(tilt)
-    forces = controller.tilt.forces(x, z, acceleration)
+    forces = controller.plant.tilt.forces(x, z, acceleration)
     gimbal = 5.0 * size * np.sin(w[0] * t)
-    gimbals = zip(controller.gimbal_angle.directions, controller.gimbal_angle.zeros, strict=True)
+    gimbals = zip(controller.plant.gimbal_angle.directions, controller.plant.gimbal_angle.zeros, strict=True)
     encoders = [zero + direction * gimbal + 1e-3 * rng.normal(size=TICKS) for direction, zero in gimbals]
     shown = [force + noise * rng.normal(size=TICKS) for force in forces] + encoders
     if reads_gyro(controller.observer):
@@ -68,24 +69,21 @@ def signals(controller: Controller, seed: int, precision: Precision) -> np.ndarr
     return samples.astype(np.float32).astype(float) if precision == "single" else samples
 
 
-def in_python(controller: Controller, samples: np.ndarray) -> np.ndarray:
+def in_python(controller: AxisControl, samples: np.ndarray) -> np.ndarray:
     """Compute the estimates and u by the controller, (n, 4 + extra signals)."""
-    fresh = Controller(
-        copy.deepcopy(controller.observer),
-        copy.deepcopy(controller.law),
-        controller.sensors,
-        controller.plant._replace(servos=()),
-        angle_source=controller.angle_source,
-        memories=controller.memories,
-    )
-    rows, end = [], 4 + len(fresh.gimbal_angle.zeros)
+    law, observer = copy.deepcopy((controller.law, controller.observer))
+    fresh = replace(controller, observers=(observer,), law=law, feedback="observer")
+    deciding = None
+    rows, end = [], 4 + len(fresh.plant.gimbal_angle.zeros)
     for k, row in enumerate(samples.tolist()):
-        tick = fresh.decide(k * fresh.period, row[:4], row[4:end], 0.0, 0.0, *row[end:])
+        delivered = Delivered(row[:4], row[4:end], 0.0, *row[end:])
+        deciding, tick = fresh.decide(deciding, k * fresh.period, delivered, 0.0)
+        deciding = deciding._replace(held=tick.u)
         rows.append([*tick.estimates[0], tick.u])
     return np.array(rows)
 
 
-def in_casadi(controller: Controller, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
+def in_casadi(controller: AxisControl, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
     """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals).
 
     Raises:
@@ -124,12 +122,12 @@ def in_casadi(controller: Controller, traced: Traced, constants: Constants, samp
     return np.array(rows)
 
 
-def columns(controller: Controller) -> list[str]:
+def columns(controller: AxisControl) -> list[str]:
     """Name the compared columns: the parts of an estimate, and u."""
     return [*STATE_SIGNALS, *controller.extra_signals[0], "u_rad_s"]
 
 
-def rounded(controller: Controller, expected: np.ndarray, precision: Precision) -> np.ndarray:
+def rounded(controller: AxisControl, expected: np.ndarray, precision: Precision) -> np.ndarray:
     """Return how far each column may be off by rounding, u also by that of the estimate, (4 + extra signals,)."""
     off = SHARE[precision] * np.abs(expected).max(axis=0)
     with suppress(InputError):  # a law without a slope
@@ -140,7 +138,7 @@ def rounded(controller: Controller, expected: np.ndarray, precision: Precision) 
     return off
 
 
-def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
+def allowed(controller: AxisControl, samples: np.ndarray, expected: np.ndarray, precision: Precision) -> np.ndarray:
     """Return how far each column may be off, by rounding and by its effect in the observer, (4 + extra signals,).
 
     An observer that switches may amplify little to much: rounding may move whatever a last digit of the inputs moves.
@@ -152,7 +150,7 @@ def allowed(controller: Controller, samples: np.ndarray, expected: np.ndarray, p
     return rounded(controller, expected, precision) + ROUNDINGS * moved.max(axis=0)
 
 
-def check_trace(controller: Controller, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:
+def check_trace(controller: AxisControl, traced: Traced, constants: Constants, seeds: Sequence[int]) -> float:
     """Compare the formulas with Python, in double precision.
 
     Returns:
@@ -188,7 +186,7 @@ def check_trace(controller: Controller, traced: Traced, constants: Constants, se
     return largest
 
 
-def _refusal(controller: Controller, part: int) -> type[InputError]:
+def _refusal(controller: AxisControl, part: int) -> type[InputError]:
     """Return the error for the first column that is off: u alone is the law's fault, unless that is (8)."""
     is_command = part == len(columns(controller)) - 1
     return LawNotExportable if is_command and type(controller.law) is not StateFeedback else InputError

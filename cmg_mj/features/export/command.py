@@ -53,10 +53,9 @@ def export(
     from cmg_mj.runs.experiment import prepare
 
     experiment = prepare(RunArguments(scenario, settings, None, out, as_json).scenario(observer))
-    experiment.require_single_axis("export")
+    controller = experiment.axis_controller("export").axes[0]
     require_stable_period(experiment.law, experiment.plant.reduced)
     note_hints(experiment.hints)
-    controller = experiment.axis_controller()
     name = name_of(controller.observer, name)
     with claim_output(out, f"export-{name}-{precision}") as folder:
         code = generate_code(controller, precision, name)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import Observer
 from cmg_mj.features.export.c_code import Precision
@@ -45,9 +45,9 @@ class Constants(NamedTuple):
     gimbals: int
 
 
-def constants_of(controller: Controller) -> Constants:
+def constants_of(controller: AxisControl) -> Constants:
     """Collect the constants of a controller."""
-    tilt, gimbals, trim = controller.tilt, controller.gimbal_angle, trim_of(controller)
+    tilt, gimbals, trim = controller.plant.tilt, controller.plant.gimbal_angle, trim_of(controller)
     centre = "the common mass centre of rig and cart" if tilt.height else "the tilt axis"
     numbered = list(enumerate(zip(gimbals.directions, gimbals.zeros, strict=True), 1))
     return Constants(
@@ -90,7 +90,7 @@ def _of_law(law: Law) -> list[Constant]:
     ]
 
 
-def format_header_comment(name: str, controller: Controller, precision: Precision) -> str:
+def format_header_comment(name: str, controller: AxisControl, precision: Precision) -> str:
     """Describe an export in a comment of its header.
 
     Args:

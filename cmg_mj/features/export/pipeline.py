@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError, raised, shown
 from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import check
@@ -39,7 +39,7 @@ class Code(NamedTuple):
     law: LawPrinter
 
 
-def generate_code(controller: Controller, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
+def generate_code(controller: AxisControl, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
     """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
     require_exportable(controller)
     try:
@@ -50,20 +50,18 @@ def generate_code(controller: Controller, precision: Precision, name: str | None
         raise InputError(f"{class_path(controller.observer)} cannot be exported: {error}") from error
 
 
-def require_exportable(controller: Controller) -> None:
+def require_exportable(controller: AxisControl) -> None:
     """Refuse what C does not have; an option that it misses otherwise, the comparison with Python finds.
 
     Raises:
         InputError: Something in use cannot be exported; the message names it.
     """
-    if type(controller) is not Controller:
-        raise InputError(f"{type(controller).__name__}: cannot be exported: only the bench's own controller is")
     if controller.feedback != "observer":
         raise InputError(
             f"controller.feedback = {shown(controller.feedback)}: cannot be exported: C has the observer's rate alone; "
             "set controller.feedback=observer"
         )
-    for stage in (*controller.command_stages, *controller.memories):
+    for stage in (*controller.commands, *controller.memories):
         if isinstance(stage, Notch):
             raise InputError("controller.notch_hz: cannot be exported: C has no notch; set controller.notch_hz=0.0")
         if not isinstance(stage, Trim):
@@ -77,7 +75,7 @@ def _copied(part: Any, refusal: type[InputError]) -> Any:
         raise refusal(f"it cannot be copied: {raised(error)}") from error
 
 
-def _generate(controller: Controller, precision: Precision, name: str) -> Code:
+def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
     for_trace, law_for_trace = _copied(controller.observer, InputError), _copied(controller.law, LawNotExportable)
     constants = constants_of(controller)
     traced = trace(for_trace, law_for_trace, constants)

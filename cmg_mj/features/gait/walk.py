@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,7 +15,7 @@ from cmg_mj.core.arrays import Scalar, clip, dot, where
 from cmg_mj.core.axis import AxisControl, Tick
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.rig import AxesOrders
+from cmg_mj.core.rig import AxesOrders, AxesStage
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.features.gait import Gait
@@ -171,7 +171,7 @@ class WalkMemory(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Walking:
+class Walking(AxesStage):
     """Moves the legs by the plan, and turns the gimbals of both axes as the feet allow.
 
     On one foot the axes are free, and each law's command is held. On two feet the robot tilts about the line of the
@@ -182,7 +182,7 @@ class Walking:
     the legs' servos run straight from tick to tick: their controls are the rates (`<intvelocity>`).
 
     Attributes:
-        actuators: The legs' servos.
+        servos: The legs' servos.
         feet: Which of the touch sensors are the feet's.
         switches: The foot switches.
         lean: Finds the equilibrium bias, and moves the torso.
@@ -192,7 +192,7 @@ class Walking:
         course: The plan.
     """
 
-    actuators: Sequence[int]
+    servos: Sequence[int]
     feet: Sequence[int]
     switches: FootSwitches
     lean: Lean
@@ -201,7 +201,15 @@ class Walking:
     dt: float
     course: Course
 
-    draws: ClassVar[Mapping[int, int]] = FootSwitches.draws
+    @property
+    def actuators(self) -> Sequence[int]:
+        """See `AxesStage`."""
+        return self.servos
+
+    @property
+    def draws(self) -> Mapping[int, int]:
+        """See `AxesStage`."""
+        return self.switches.draws
 
     @property
     def tables(self) -> dict[str, Course]:
@@ -255,7 +263,7 @@ class Walking:
     def _legs(self, ends: Sequence[Sequence[float]], before: Sequence[Scalar], after: Sequence[Scalar]) -> list[Scalar]:
         """Return the rates at which the servos' setpoints run until the next tick."""
         rates = []
-        n = len(self.actuators)
+        n = len(self.servos)
         for i in range(n):
             begin, end = (
                 plan[i] + lean[0] * plan[n + i] + lean[1] * plan[2 * n + i]

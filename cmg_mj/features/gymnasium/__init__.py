@@ -13,11 +13,11 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
+from cmg_mj.core.axis import passed
 from cmg_mj.core.errors import InputError, nearest
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.core.noise import NoiseStream, normals
-from cmg_mj.core.sensor import whole_steps
-from cmg_mj.core.types import IdealReading
+from cmg_mj.core.noise import Normals
+from cmg_mj.core.sensor import SensorState, Site, whole_steps
 from cmg_mj.plant.mjcf import posed, quiet
 from cmg_mj.plant.physics import OneWorld
 from cmg_mj.results.baselines import MEMS_GYRO
@@ -150,28 +150,33 @@ class ScissoredPairEnv(gymnasium.Env):
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, world_ids=self._world
         )
-        gyro = scenario.sensors.mems_gyro
-        noise = normals(seed, self._world, NoiseStream.MEMS_GYRO, gyro.channels)
-        self._read_gyro = gyro.make_reading_function(experiment.law.dt, noise)
+        (self._axis,) = self._controller.axes
+        self._servos = tuple(stage.init(0.0) for stage in self._axis.servos)
+        calibrated = dataclasses.replace(scenario.sensors.mems_gyro, reading="calibrated")
+        self._gyro = calibrated.at_work(Site("sensors.mems_gyro", timestep), experiment.law.dt)
+        self._noise = {n: Normals(seed, self._world, n, width) for n, width in self._gyro.draws.items()}
+        self._gyro_state: SensorState | None = None
         self._fall = np.radians(scenario.metrics.fall_angle_deg).item()
         self._steps = whole_steps(scenario.duration_s, timestep, "duration_s", f"{scenario.duration_s:g} s")
         self._loop = ControlLoop(self._physics, self._controller, self._steps, acting, self._fall)
-        self._ticks = self._loop.ticks()
         self._running = True
         self._to_tick()
 
     def _to_tick(self) -> Literal["tick", "end", "fall"]:
         """Go on to the next control tick, where the agent decides."""
-        if next(self._ticks, None) is not None:
-            return "tick"
-        if not self._physics.any_running:
-            return "fall"
-        self._loop.step = self._steps
-        _, v = self._physics.state()
-        reading = self._physics.reading(v)
-        assert isinstance(reading, IdealReading)  # of one axis
-        self._controller.sample(self._steps, reading)
-        return "end"
+        loop, how = self._loop, "tick"
+        if loop.next_tick() is None:
+            if not self._physics.any_running:
+                return "fall"
+            how = "end"
+            loop.step = self._steps
+            loop.readings = self._physics.reading(self._physics.state()[1])
+        self._controller.sample(loop.step, loop.readings)
+        if self._gyro_state is None:
+            self._gyro_state = self._gyro.init(loop.readings, self._noise)
+        else:
+            self._gyro_state = self._gyro.sample(self._gyro_state, loop.step, loop.readings, self._noise)
+        return how
 
     @quiet()
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -194,8 +199,8 @@ class ScissoredPairEnv(gymnasium.Env):
         limit = self.experiment.law.rate_limit
         u = min(max(float(values[0]) * self._unit, -limit), limit)
         cost = self._cost(u)
-        self._controller.command_rate(u)
-        self._physics.command(self._controller.gimbal_rate)
+        self._servos, rate = passed(self._axis.servos, self._servos, u)
+        self._physics.command(rate)
         self._loop.advance()
         how = self._to_tick()
         self._running = how == "tick"
@@ -217,25 +222,24 @@ class ScissoredPairEnv(gymnasium.Env):
         return (sum(squares) + u * u) * self.experiment.law.dt
 
     def _observed(self) -> tuple[np.ndarray, dict[str, Any]]:
-        step, controller = self._loop.step, self._controller
-        forces, encoders, fog = controller.readings(step)
+        step, axis = self._loop.step, self._axis
+        delivered = axis.delivered(self._controller.state.sampled[0], step)
+        measured = axis.measure(delivered)
         x1, x2, x3 = self._state()
-        tilt = controller.tilt
-        extra = {
-            MEMS_GYRO: self._read_gyro(np.array([[controller.body_rate]])).item(),
-            "acceleration": tilt.acceleration(*forces),
-            "fog": fog,
-        }
-        y = [tilt(*forces), controller.gimbal_angle(encoders), *(extra[name] for name in self._readings)]
+        assert self._gyro_state is not None
+        (gyro,) = self._gyro.read(self._gyro_state, step)
+        extra = {MEMS_GYRO: gyro, "acceleration": measured.acceleration, "fog": delivered.fog}
+        y = [*measured, *(extra[name] for name in self._readings)]
         high = self.observation_space.high  # pyright: ignore[reportAttributeAccessIssue]
         observation = np.clip(np.array(y, dtype=np.float64), -high, high)
-        gyro = [controller.read_gyro(step)] if controller.reads_gyro else []
+        forces, encoders, fog, own_gyro = delivered
+        needed = [own_gyro] if axis.reads_gyro else []
         info = {
-            "time_s": step * controller.timestep,
+            "time_s": step * axis.timestep,
             "x1_rad": x1,
             "x2_rad_s": x2,
             "x3_rad": x3,
-            "readings": (step, tuple(forces), tuple(encoders), fog, x2, *gyro),
+            "readings": (step, tuple(forces), tuple(encoders), fog, x2, *needed),
         }
         return observation, info
 

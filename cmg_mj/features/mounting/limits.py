@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.controller import KnownPlant
+from cmg_mj.core.axis import KnownPlant
 from cmg_mj.core.loop import ControlLoop, Joints
 from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.tilt import GimbalAngle
@@ -284,13 +284,13 @@ def push_limits(experiment: Experiment, axis: str = "") -> PushLimits:
     Returns:
         The limits.
     """
-    experiment = next((part for part in experiment.axes if part.plant.axis.name == axis), experiment)
-    plant = experiment.plant
-    limit = ceiling(plant.reduced, experiment.law.rate_limit)
+    part = next((part for part in experiment.axes if part.name == axis), experiment.axes[0])
+    plant = part.plant
+    limit = ceiling(plant.reduced, part.law.rate_limit)
     with set_control_callback(None), quiet():
         pole = simulated_pole(plant.model, plant.key, plant.axis.line, plant.axis.bias)
-    margin = push_margin(experiment.design)
-    poles = sliding_poles(experiment.law, plant)
+    margin = push_margin(part.design)
+    poles = sliding_poles(part.law, plant)
     return PushLimits(plant.reduced, limit, margin, pole, poles)
 
 

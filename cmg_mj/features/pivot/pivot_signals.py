@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.loop import Outside
@@ -142,7 +142,7 @@ class PivotSignals:
         timestep: Physics step of the disturbance [s].
     """
 
-    edges: Collection[int] = ()
+    edges: Sequence[int] = ()
     accelerates = True
     actuators: Sequence[int] = ()
 

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop
-from cmg_mj.core.runners import as_estimate
+from cmg_mj.core.types import as_estimate
 from cmg_mj.features.plugin.model import INSTANCE, mujoco_library
 from cmg_mj.features.plugin.sensors import check_noise
 from cmg_mj.plant.mjcf import OWN
@@ -37,22 +37,22 @@ class PluginLoop(ControlLoop):
         model, data = self.physics.model, self.physics.data
         if any(state[STATUS] == FAILED for state in instance_states(model, data)):
             raise RunStopped(f"the plugin has stopped at t = {data.time:g} s")
-        self.controller.control(self.step)
-        for name, part in zip(self.physics.axis_names, self.controller.axes, strict=True):
-            _take_over(part, data, "/".join(filter(None, (INSTANCE, name))))
+        self.controller.update(self.step, self.readings)
+        prefixes = ["/".join(filter(None, (INSTANCE, name))) for name in self.physics.axis_names]
+        ticks = zip(self.controller.ticks, prefixes, strict=True)
+        self.controller.overrule([_decided(tick, data, prefix) for tick, prefix in ticks])
 
 
-def _take_over(part: Controller, data: mujoco.MjData, prefix: str) -> None:
-    """Give a controller's last tick the plugin's numbers."""
-    assert part.tick is not None
+def _decided(tick: Tick, data: mujoco.MjData, prefix: str) -> Tick:
+    """Return a tick with the plugin's numbers."""
 
     def shown(quantity: str) -> list[float]:
         return data.sensor(f"{prefix}/{quantity}").data.tolist()
 
     (y1,), (y2,), (acceleration,) = shown("tilt"), shown("gimbal_angle"), shown("acceleration")
     (u,), (x_e,) = shown("command"), shown("integrator")
-    estimates = [as_estimate(shown("estimate")), *part.tick.estimates[1:]]
-    part.tick = part.tick._replace(y1=y1, y2=y2, acceleration=acceleration, u=u, x_e=x_e, estimates=estimates)
+    estimates = [as_estimate(shown("estimate")), *tick.estimates[1:]]
+    return tick._replace(y1=y1, y2=y2, acceleration=acceleration, u=u, x_e=x_e, estimates=estimates)
 
 
 def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:

@@ -101,7 +101,7 @@ def require_stable_periods(experiment: Experiment) -> None:
         try:
             require_stable_period(part.design.law, part.plant.reduced)
         except InputError as error:
-            name = part.plant.axis.name
+            name = part.name
             raise InputError(f"axis {name}: {error}" if name else str(error)) from error
 
 
@@ -136,12 +136,12 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
                 raise InputError(f"{field}: {clause}: a plugin does not have it")
         axis = part.plant.axis
         modules = tuple((module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules)
-        controller = part.design.controller(part.plant.interface, world_ids=world, axis=i)
+        controller = part.design.axis_control(part.plant.interface, axis=i)
         joint = mujoco.mj_id2name(part.plant.model, mujoco.mjtObj.mjOBJ_JOINT, axis.line.joint)
         axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))
     compensates = len(axes) > 1 and experiment.scenario.controller.compensate_turning
     turning = (experiment.plant.turning, experiment.scenario.sensors.mems_gyro) if compensates else None
-    return PluginRig(axes, f"cmg_mj.{name}", world, turning)
+    return PluginRig(axes, f"cmg_mj.{name}", experiment.scenario.seed, world, turning)
 
 
 def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:

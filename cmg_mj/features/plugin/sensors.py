@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
-from cmg_mj.core.controller import Controller
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of
+from cmg_mj.core.noise import NoiseStream, spread_of, wander_shares
 from cmg_mj.core.sensor import steps_until, whole_steps
 from cmg_mj.core.types import STANDARD_GRAVITY, reads_gyro
 from cmg_mj.sensors.accelerometer import Accelerometer
@@ -39,14 +37,14 @@ class PluginAxis(NamedTuple):
             of its gimbal at which the flywheel's axis is upright [rad].
         joint: Name of the joint that it tilts about.
         shares: Of the joint's degrees of freedom in the tilt rate: of a hinge one, of a free joint those of the turn.
-        controller: Its controller, of one world.
+        controller: Its control.
     """
 
     prefix: str
     modules: tuple[tuple[str, float, float, float], ...]
     joint: str
     shares: tuple[float, ...]
-    controller: Controller
+    controller: AxisControl
 
 
 class PluginRig(NamedTuple):
@@ -55,12 +53,14 @@ class PluginRig(NamedTuple):
     Attributes:
         axes: The axes.
         plugin: Name under which MuJoCo knows the plugin.
+        seed: Seed of its noise.
         world: The world whose noise it has.
         turning: The coupling of the axes in a turn, and the gyro that shows it; None if turns are not compensated.
     """
 
     axes: list[PluginAxis]
     plugin: str
+    seed: int
     world: int
     turning: tuple[YawCoupling, MemsGyro] | None
 
@@ -77,7 +77,7 @@ def refuse_unsupported(rig: PluginRig) -> None:
     for count, what, most in counts:
         if count > most:
             raise InputError(f"{count} {what}: a plugin takes at most {most}")
-    check_noise(rig.axes[0].controller.seed, rig.world)
+    check_noise(rig.seed, rig.world)
 
 
 def check_noise(seed: float, world: float) -> None:
@@ -140,7 +140,7 @@ def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
         "prefix": axis.prefix,
         "gimbals": len(axis.modules),
         "modules": axis.modules,
-        "pair": _describe_pair(pair, controller.axis, clock),
+        "pair": _describe_pair(pair, controller.number, clock),
         "encoder": {
             "period": clock.count(1.0 / encoder.rate_hz),
             "delivery": clock.delivery(len(axis.modules), encoder.rate_hz, encoder.latency_s),
@@ -150,7 +150,7 @@ def describe_axis(axis: PluginAxis, clock: Clock) -> Struct:
             "force_step": pair.resolution,
             "angle_step": encoder.resolution,
         },
-        **({"fog": _describe_fog(fog, controller.axis, clock)} if controller.feedback == "fog" else {}),
+        **({"fog": _describe_fog(fog, controller.number, clock)} if controller.feedback == "fog" else {}),
         **({"mems_gyro": _describe_own_gyro(controller)} if reads_gyro(controller.observer) else {}),
         "raw_rate": pair.raw_rate_hz,
         "joint": axis.joint,
@@ -174,7 +174,7 @@ def _describe_pair(sensor: Accelerometer, axis: int, clock: Clock) -> Struct:
         "period": period,
         "raw": raw,
         "skew": skew,
-        "settling": math.ceil(2.0 * INSIDE_HZ / sensor.bandwidth_hz) if sensor.bandwidth_hz else 0,
+        "settling": sensor.settle_samples,
         "outer_capacity": -(-skew // raw) + 2 if skew else 0,
         "limit": sensor.range_g * STANDARD_GRAVITY,
         "is_distorted": int((same, other) != PERFECT),
@@ -203,9 +203,9 @@ def _describe_fog(sensor: Fog, axis: int, clock: Clock) -> Struct:
     }
 
 
-def _describe_own_gyro(controller: Controller) -> Struct:
+def _describe_own_gyro(controller: AxisControl) -> Struct:
     """Describe the cheap gyro of an axis, whose reading the observer takes."""
-    streams = (stream.on_axis(controller.axis) for stream in (NoiseStream.MEMS_GYRO, NoiseStream.MEMS_PART))
+    streams = (stream.on_axis(controller.number) for stream in (NoiseStream.MEMS_GYRO, NoiseStream.MEMS_PART))
     return describe_mems_gyro(controller.sensors.mems_gyro, controller.law.dt, *streams)
 
 
@@ -214,7 +214,7 @@ def describe_mems_gyro(gyro: MemsGyro, dt: float, stream: int, part_stream: int 
     return {
         "stream": stream,
         "part_stream": part_stream,
-        "resting": round(gyro.calibration_s / dt),
+        "resting": gyro.resting_samples(dt),
         "piece": PIECE,
         "sigma": gyro.white_noise_sigma(dt),
         "limit": math.radians(gyro.range_deg_s),
@@ -230,5 +230,5 @@ def describe_mems_gyro(gyro: MemsGyro, dt: float, stream: int, part_stream: int 
 
 def _flicker(floor: float, dt: float) -> Struct:
     """Return the numbers of 1/f noise."""
-    noise = FlickerNoise(floor, dt, np.zeros(len(CORNERS_HZ)))
-    return {"flicker_sigma": spread_of(floor), "decay": noise.decay.tolist(), "spread": noise.spread.tolist()}
+    decays, spreads = wander_shares(floor, dt)
+    return {"flicker_sigma": spread_of(floor), "decay": decays, "spread": spreads}

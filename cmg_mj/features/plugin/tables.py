@@ -5,7 +5,6 @@ Compiles it, and prints what stands beside it.
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 import platform
@@ -32,7 +31,6 @@ from cmg_mj.features.plugin.sensors import (
     describe_mems_gyro,
     refuse_unsupported,
 )
-from cmg_mj.stages.backlash import Backlash
 from cmg_mj.stages.trim import trim_of
 
 if TYPE_CHECKING:
@@ -175,8 +173,8 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     files, names = common_files(), []
     for number, axis in enumerate(rig.axes):
         suffix = f"_{number}" if len(rig.axes) > 1 else ""
-        own, controller = name + suffix, copy.copy(axis.controller)
-        controller.feedback = "observer"  # which the export takes; the plugin's own C chooses the rate
+        own = name + suffix
+        controller = replace(axis.controller, feedback="observer")  # the plugin's own C chooses the rate
         code = generate_code(controller, "double", name, suffix)
         files |= {file: code.files[file] for file in (f"{own}.h", f"{own}.c")}
         files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
@@ -203,7 +201,7 @@ def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: L
     controller = axis.controller
     y = "y[0], y[1], y[2], y[3]" if reads_gyro(controller.observer) else "y[0], y[1], y[2]"
     n, trim, formulas = name, trim_of(controller), law.law
-    gap = sum(stage.gap for stage in controller.servo_stages if isinstance(stage, Backlash))
+    gap = controller.plant.backlash
     trimmed = -(-trim.until // controller.period)
     fields = {
         "estimates": 3 + len(controller.extra_signals[0]),
@@ -308,14 +306,14 @@ def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
     turning = ""
     if rig.turning is not None:
         coupling, gyro = rig.turning
-        matrices = {name: matrix.tolist() for name, matrix in coupling._asdict().items()}
+        matrices = coupling._asdict()
         calibrated = replace(gyro, reading="calibrated")
         described = {"gyro": describe_mems_gyro(calibrated, first.law.dt, NoiseStream.TURN_GYRO), **matrices}
         turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
     fields = {
         "plugin": rig.plugin,
         "build": build,
-        "seed": float(first.seed),
+        "seed": float(rig.seed),
         "world": float(rig.world),
         "instant": clock.instant,
         "period": clock.period // clock.steps,

@@ -5,14 +5,16 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
+from bisect import bisect_right
 from collections import deque
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from cmg_mj.core.controller import ControllerState
 from cmg_mj.core.errors import InputError, RunStopped
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import acting, next_instant
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
 from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.messages import LARGEST
@@ -27,6 +29,9 @@ from cmg_mj.stages.push import Push, Pushes
 
 PLOTTED_TICKS = 2400
 """Number of plotted ticks: 12 s at 200 Hz."""
+
+SAVED = 20_000
+"""Number of instants to which the controller can go back: 100 s at 200 Hz."""
 
 PHYSICS_ARRAYS = (
     "actuator_acc0",
@@ -126,12 +131,12 @@ class StudioSession:
             self.plant = make(scenario.section(name), self.plant, scenario.seed, 0)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
-        self._nothing = Outside([0.0] * len(self._lines))
         self._users_pushes: list[Push] = []
         others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
         self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
         self._gravity = self.model.opt.gravity.copy()
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
+        self._saved: dict[int, ControllerState] = {}
         self.data = mujoco.MjData(self.model)
         self.start()
 
@@ -154,42 +159,32 @@ class StudioSession:
         step = round(self.data.time / self.timestep)
         self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
         self.ticks.clear()
+        self._saved.clear()
         self.diverged = False
         self._next = step
         """The next step, unless someone moves the state in time."""
-        self._start_controller(step)
+        self._start_controller()
 
-    def _start_controller(self, step: int) -> None:
+    def _start_controller(self) -> None:
         self.controller = self.now.controller()
+        self._saved.clear()
         self.note = self.stopped = ""
-        self._start_pushes(step)
+        self._set_pushes()
 
-    def _start_pushes(self, step: int) -> None:
-        """Bring the pushes, the scenario's and the user's, to a physics step."""
+    def _set_pushes(self) -> None:
+        """Let the scenario's pushes and the user's act."""
         pushes = [*self.base.scenario.push, *self._users_pushes]
-        self._pushes = Pushes(pushes, self.timestep, self.plant.axis_names)
-        self._edges = sorted(self._pushes.edges)
-        start, self._outside_until = self._interval(step)
-        for edge in self._edges:
-            if edge < start:
-                self._pushes(edge, 1, self._nothing)
-        self._set_outside(start)
+        self._disturbances = [Pushes(pushes, self.timestep, self.plant.axis_names), *self._others]
+        self._edges = sorted(edge for disturbance in self._disturbances for edge in disturbance.edges)
+        self._acts_until = self._next
 
-    def _interval(self, step: int) -> tuple[int, int]:
-        """Return the steps around a physics step between which the torques are constant: the first, and the next."""
-        grid = self.controller.steps_per_sample
-        start, end = step // grid * grid, step // grid * grid + grid
-        return (
-            max([start, *(edge for edge in self._edges if edge <= step)]),
-            min([end, *(edge for edge in self._edges if edge > step)]),
-        )
-
-    def _set_outside(self, start: int) -> None:
-        """Set torques and the pivot's acceleration from a physics step on, until the interval's end."""
-        outside = self._nothing
-        for disturbance in (self._pushes, *self._others):
-            outside = disturbance(start, self._outside_until - start, outside)
-        self._torques = outside.torques
+    def _set_outside(self, step: int) -> None:
+        """Set what acts from outside around a physics step."""
+        grid, place = self.controller.steps_per_sample, bisect_right(self._edges, step)
+        start = max([step // grid * grid, *self._edges[:place][-1:]])
+        self._acts_until = next_instant(step, grid, self._edges)
+        outside = acting(self._disturbances, start, self._acts_until - start)
+        self._torques = outside.torques or [0.0] * len(self._lines)
         if outside.acceleration is not None:
             self.model.opt.gravity[:] = self._gravity - outside.acceleration
         if outside.setpoints is not None:
@@ -197,11 +192,25 @@ class StudioSession:
             self.data.ctrl[actuators] = setpoints
 
     def sync_to_time(self) -> int:
-        """Begin again at the state's time, if someone has moved the state; return the step."""
+        """Return the step of the state's time. If someone has moved the state, the controller goes there too.
+
+        Where it has been before, within the last `SAVED` instants, it goes on as then; elsewhere it begins again.
+        """
         step = round(self.data.time / self.timestep)
-        if step != self._next:
+        if step == self._next:
+            return step
+        grid = self.controller.steps_per_sample
+        saved = self._saved.get((step - 1) // grid * grid)
+        if saved is None:
             self.begin()
             self.note = f"the controller starts afresh at t = {self.data.time:g} s"
+            return step
+        self.controller.state = saved
+        self.stopped = self.note = ""
+        self.diverged = False
+        self._next = self._acts_until = step
+        while self.ticks and self.ticks[-1][0].time_s > self.data.time - 1e-9:
+            self.ticks.pop()
         return step
 
     def step(self) -> bool:
@@ -213,9 +222,8 @@ class StudioSession:
             Whether there was a control tick.
         """
         data, step = self.data, self.sync_to_time()
-        if step >= self._outside_until:
-            start, self._outside_until = self._interval(step)
-            self._set_outside(start)
+        if step >= self._acts_until:
+            self._set_outside(step)
         # Studio's mouse writes xfrc_applied: MuJoCo adds them up.
         apply_torques(data.qfrc_applied, self._lines, self._torques)
         ticked = not self.stopped and self._control()
@@ -237,14 +245,22 @@ class StudioSession:
         except (InputError, RunStopped) as error:
             self._stop(str(error))
             return False
+        self._save(self.controller.state)
         if ticked:
             self.ticks.append(tuple(map(self._plotted_tick, range(len(self._lines)))))
         return ticked
 
+    def _save(self, state: ControllerState) -> None:
+        if state.step is None:
+            return
+        self._saved.pop(state.step, None)
+        if len(self._saved) >= SAVED:
+            del self._saved[next(iter(self._saved))]
+        self._saved[state.step] = state
+
     def _plotted_tick(self, axis: int) -> PlottedTick:
         """Return the last tick of an axis."""
-        data, line, tick = self.data, self._lines[axis], self.controller.axes[axis].tick
-        assert tick is not None
+        data, line, tick = self.data, self._lines[axis], self.controller.ticks[axis]
         x1 = math.degrees(float(line.lean(data.qpos)) + self.now.plant.axes[axis].bias)
         return PlottedTick(data.time, x1, float(line.rate(data.qvel)), tick.estimates[0][1], tick.u)
 
@@ -279,7 +295,8 @@ class StudioSession:
 
     def restart_controller(self) -> None:
         """Start the controller afresh at the present state, for instance after the failure of an observer."""
-        self._start_controller(self.sync_to_time())
+        self.sync_to_time()
+        self._start_controller()
 
     def push(self, torque: float, duration_s: float, axis: int = 0) -> None:
         """Push from now on: torque about a tilt axis by its index [N m], duration [s]."""
@@ -289,4 +306,4 @@ class StudioSession:
             return
         duration_s = max(1, round(duration_s / dt)) * dt
         self._users_pushes.append(Push(step * dt, duration_s, torque, self.plant.axis_names[axis]))
-        self._start_pushes(step)
+        self._set_pushes()

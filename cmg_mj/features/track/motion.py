@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -142,7 +142,7 @@ class TrackMotion:
     """
 
     accelerates = False
-    edges: Collection[int] = ()
+    edges: Sequence[int] = ()
 
     def __init__(self, tracks: Sequence[Track], model: mujoco.MjModel) -> None:
         self._timestep = float(model.opt.timestep)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.controller import Feedback
+from cmg_mj.core.axis import Feedback
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.types import law_needs, reads_gyro
 from cmg_mj.features.tuning.fit import NoiseLevelResult, OnShare, ParameterFit, ScoringData, Study
