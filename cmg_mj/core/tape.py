@@ -28,9 +28,10 @@ Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
 RECORDED = frozenset(
     """
-    absolute add subtract multiply divide negative sign maximum minimum power float_power copysign
+    absolute fabs add subtract multiply divide negative sign maximum minimum power float_power copysign
     sqrt exp expm1 log log1p sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 hypot floor ceil rint fmod
-    less less_equal greater greater_equal equal not_equal logical_and logical_or logical_not bitwise_and bitwise_or invert
+    less less_equal greater greater_equal equal not_equal logical_and logical_or logical_not
+    bitwise_and bitwise_or invert
     """.split()  # noqa: SIM905
 )
 """NumPy's functions that a tape takes, beside `where`, `clip`, `square` and `positive`."""
@@ -77,11 +78,13 @@ class Tape:
         """Find the place of a symbol, or of a plain number, which becomes a constant.
 
         Raises:
-            InputError: It is neither.
+            InputError: It is neither, or a symbol of another tape.
         """
         if isinstance(number, np.ndarray) and number.ndim == 0:
             number = number[()]
         if isinstance(number, Symbol):
+            if number.tape is not self:
+                raise InputError(f"a number remembered from an earlier recording {here()}")
             return number.place
         if isinstance(number, (bool, int, float, np.bool_, np.integer, np.floating)):
             return self._append(Operation(CONSTANT, value=float(number)))
