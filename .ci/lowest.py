@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-EXTRAS = ("papers", "export", "cluster", "gymnasium", "notebook", "test")
+EXTRAS = ("papers", "cluster", "gymnasium", "notebook", "test")
 
 
 def main() -> None:

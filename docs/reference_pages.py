@@ -816,8 +816,7 @@ COMMANDS: dict[str, Notes] = {
 }
 """Command -> examples and durations."""
 NEEDS = {
-    "export": 'This command needs the extra `export`: `python -m pip install ".[export]"`.',
-    "plugin": 'This command needs a C compiler and the extra `export`: `python -m pip install ".[export]"`.',
+    "plugin": "This command needs a C compiler.",
     "reproduce": 'This command needs the extra `papers`: `python -m pip install ".[papers]"`.',
 }
 """Command -> what must be installed."""

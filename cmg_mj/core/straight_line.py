@@ -13,11 +13,10 @@ from typing import Any
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tape import CHOICE, CONSTANT, INPUT, Symbol, Tape
 
-SAME_IN_MATH = ("sqrt", "exp", "sin", "cos", "tan")
+SAME_IN_MATH = ("sqrt", "exp", "sin", "cos")
 PYTHON = {
     **{name: f"{name}({{0}})" for name in SAME_IN_MATH},
     "copysign": "copysign({0}, {1})",
-    "hypot": "hypot({0}, {1})",
     "add": "{0} + {1}",
     "subtract": "{0} - {1}",
     "multiply": "{0} * {1}",
@@ -37,15 +36,15 @@ PYTHON = {
     "greater_equal": "{0} >= {1}",
     "equal": "{0} == {1}",
     "not_equal": "{0} != {1}",
-    "logical_and": "{0} and {1}",
-    "logical_or": "{0} or {1}",
+    "logical_and": "bool({0} and {1})",
+    "logical_or": "bool({0} or {1})",
     "logical_not": "not {0}",
     "bitwise_and": "{0} and {1}",
     "bitwise_or": "{0} or {1}",
     "invert": "not {0}",
     CHOICE: "{1} if {0} else {2}",
 }
-"""NumPy's function -> Python on floats."""
+"""NumPy's function -> Python on floats, which rounds as `arrays` does on them; `math` rounds `hypot` otherwise."""
 ARGUMENT_TWICE = ("sign", "maximum", "minimum")
 LONGEST = 120
 """Longest expression that is written where it is used [characters]."""
@@ -191,16 +190,21 @@ def straight_line(
     patterns, arguments = zip(*map(recorder.given, trees), strict=True)
     result = function(*arguments, {key: recorder.table(key, table) for key, table in tables.items()})
     places = [symbol.place for symbol in _symbols(result)]
-    texts, body = _operations(recorder.tape, places)
+    texts, body = print_operations(recorder.tape, places)
     names = [f"a{i}" for i in range(len(trees))]
     unpacked = [f"{pattern} = {name}" for pattern, name in zip(patterns, names, strict=True)]
     checked = [texts[symbol.place] for symbol in _symbols(finite(result) if finite else ())]
     check = [f"if not abs({' + '.join(checked)}) < inf: raise ArithmeticError"] if checked else []
     returned = recorder.printed(result, texts)
     lines = [*unpacked, *_ordered(recorder.lines), *body, *check, *recorder.endings, f"return {returned}"]
-    source = f"def run({', '.join(names)}, tables):\n" + "".join(f"    {line}\n" for line in lines)
-    exec(compile(source, f"<{function.__qualname__}, printed>", "exec"), recorder.known)
-    return recorder.known["run"]
+    return compiled(function.__qualname__, [*names, "tables"], lines, recorder.known)
+
+
+def compiled(name: str, parameters: Sequence[str], lines: Sequence[str], known: dict[str, Any]) -> Callable[..., Any]:
+    """Compile the printed body of a function; `known` has what it calls, and is added to."""
+    source = f"def run({', '.join(parameters)}):\n" + "".join(f"    {line}\n" for line in lines)
+    exec(compile(source, f"<{name}, printed>", "exec"), known)
+    return known["run"]
 
 
 def _ordered(lines: Sequence[str]) -> list[str]:
@@ -217,8 +221,22 @@ def _symbols(tree: Any) -> Iterable[Symbol]:
             yield from _symbols(part)
 
 
-def _operations(tape: Tape, results: Sequence[int]) -> tuple[dict[int, str], list[str]]:
-    """Print the needed operations: the text of each place, and the lines before the results."""
+def print_operations(
+    tape: Tape, results: Sequence[int], words: Mapping[str, str] = PYTHON
+) -> tuple[dict[int, str], list[str]]:
+    """Print the operations that results need as Python.
+
+    Args:
+        tape: The tape; an input's name is a name in Python.
+        results: Places of the results.
+        words: NumPy's function -> its expression, in which `{0}` is its first argument.
+
+    Returns:
+        The text of each place, and the lines before the results.
+
+    Raises:
+        InputError: An operation is not among the words.
+    """
     texts: dict[int, str] = {}
     lines: list[str] = []
     for place, users in tape.uses(results).items():
@@ -228,7 +246,7 @@ def _operations(tape: Tape, results: Sequence[int]) -> tuple[dict[int, str], lis
         elif operation.name == CONSTANT:
             texts[place] = _literal(operation.value)
         else:
-            template = PYTHON.get(operation.name)
+            template = words.get(operation.name)
             if template is None:
                 raise InputError(f"{operation.name}: is not printed as Python")
             text = template.format(*(texts[argument] for argument in operation.arguments))

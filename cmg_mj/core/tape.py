@@ -29,7 +29,7 @@ Operand: TypeAlias = "Symbol | float | np.generic | np.ndarray"
 
 RECORDED = frozenset(
     """
-    absolute add subtract multiply divide negative sign maximum minimum power float_power copysign
+    absolute fabs add subtract multiply divide negative sign maximum minimum power float_power copysign
     sqrt exp expm1 log log1p sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 hypot floor ceil rint fmod
     less less_equal greater greater_equal equal not_equal
     logical_and logical_or logical_not bitwise_and bitwise_or invert
@@ -81,9 +81,11 @@ class Tape:
         """Find the place of a symbol, or of a plain number, which becomes a constant.
 
         Raises:
-            InputError: It is neither.
+            InputError: It is neither, or a symbol of another tape.
         """
         if type(number) is Symbol:
+            if number.tape is not self:
+                raise InputError(f"a number remembered from an earlier recording {here()}")
             return number.place
         if isinstance(number, np.ndarray) and number.ndim == 0:
             return self.place(number[()])

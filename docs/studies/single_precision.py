@@ -2,7 +2,7 @@
 
     python docs/studies/single_precision.py [--observers NAMES] [--worlds 100] (about half a minute)
 
-It needs a C compiler and CasADi.
+It needs a C compiler.
 
 push_recovery, the loop closed on the true rate, so that all observers are shown the same. RMS differences of an
 observer's rate: of the C; of Python itself, shown y1, y2, acceleration and u rounded to floats once; of Python, shown

@@ -11,7 +11,7 @@ DATA = Path(__file__).parents[2] / "examples/data/stepper_encoder_gyro.csv"
 LIST, CHECK, RUN = "list", "check push_recovery", "run push_recovery --out run"
 REPLAY = f"replay {DATA} --columns time=time_s,tilt=encoder_rad,rate=gyr_y_rad_s --out replay"
 
-NEVER = ["control", "casadi", "gymnasium", "sympy"]
+NEVER = ["control", "gymnasium", "sympy"]
 FITTING = ["scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate", "matplotlib"]
 FILES = ["pyarrow", "rerun", "tabulate"]
 FORBIDDEN = {

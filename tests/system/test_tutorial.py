@@ -87,8 +87,7 @@ def run_line(line: str) -> str:
 @pytest.mark.slow
 @pytest.mark.usefixtures("elsewhere")
 def test_every_block_prints_what_the_page_says() -> None:
-    for module in ("gymnasium", "casadi"):
-        pytest.importorskip(module)
+    pytest.importorskip("gymnasium")
     for folder in LAID_OUT:
         shutil.copytree(ROOT / folder, folder)
     output: list[str] = []

@@ -8,17 +8,16 @@
     files = export(controller, Path("board"), precision="single")
     # [board/linear.h, board/linear.c, board/linear_example.c, board/linear_test_vector.h]
 
-CasADi symbols run through the observer's Python code once and record its operations; each operation is then printed in
-C. Random signals compare the formulas with Python always, and the C where there is a compiler.
+Symbols run through the observer's Python code once, and a tape records its operations; each operation is then printed
+in C. Random signals compare the formulas with Python always, and the C where there is a compiler.
 """
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from cmg_mj.core.errors import InputError, raised
+from cmg_mj.core.errors import InputError
 
 if TYPE_CHECKING:
     from cmg_mj.core.axis import AxisControl
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from cmg_mj.features.export.pipeline import Code
     from cmg_mj.results.folder import RunFolder
 
-__all__ = ["check_installed", "export", "generate_code", "write_code"]
+__all__ = ["export", "generate_code", "write_code"]
 
 
 def export(
@@ -49,8 +48,7 @@ def export(
         The files: NAME.h, NAME.c, NAME_example.c, NAME_test_vector.h.
 
     Raises:
-        InputError: The controller cannot be exported, the C differs from Python, CasADi is missing, or the folder
-            cannot be written.
+        InputError: The controller cannot be exported, the C differs from Python, or the folder cannot be written.
     """
     control, *others = controller.axes
     if others:
@@ -65,7 +63,6 @@ def generate_code(
 
     Its name has a suffix, which tells a plugin's axes apart.
     """
-    check_installed()
     from cmg_mj.features.export import pipeline
 
     return pipeline.generate_code(controller, precision, name, suffix)
@@ -81,17 +78,3 @@ def write_code(out: Path | RunFolder, code: Code) -> list[Path]:
             all_or_none=True,  # the example needs the code, and the code its test vector to be believed
         )
     return [place / name for name in code.files]
-
-
-def check_installed() -> None:
-    """Require CasADi, before anything is computed.
-
-    Raises:
-        InputError: CasADi is not installed, or cannot be imported.
-    """
-    if find_spec("casadi") is None:
-        raise InputError('export: casadi is not installed: python -m pip install "cmg_mj[export]"')
-    try:
-        import casadi  # noqa: F401
-    except Exception as error:
-        raise InputError(f"export: casadi cannot be imported: {raised(error)}") from error

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import casadi
-
 from cmg_mj.core.axis import AxisControl
 from cmg_mj.features.export.c_code import Precision, body, literal
 from cmg_mj.features.export.constants import Constant, Constants, class_path, format_header_comment
+from cmg_mj.features.export.formula import Formula
 from cmg_mj.features.export.names import estimate_places
-from cmg_mj.features.export.symbol import MEASURED
-from cmg_mj.features.export.trace import Traced, TracedLaw
+from cmg_mj.features.export.trace import MEASURED, Traced, TracedLaw
 
 TYPES = {"double": "double", "single": "float"}
 
@@ -277,8 +275,8 @@ static int is_finite({real} x)
         width = max(len(text) for text, _ in lines)
         return "".join(f"static const {self.name}_real {text:<{width}} /* {words} */\n" for text, words in lines)
 
-    def _body(self, function: casadi.Function, inputs: Sequence[str], outputs: Sequence[str]) -> str:
-        lines = body(function, inputs, outputs, f"{self.name}_real", self.precision)
+    def _body(self, formula: Formula, inputs: Sequence[str], outputs: Sequence[str]) -> str:
+        lines = body(formula, inputs, outputs, f"{self.name}_real", self.precision)
         return "".join(f"    {line}\n" for line in lines)
 
 
@@ -407,8 +405,8 @@ def _rows(table: Table, precision: Precision) -> str:
 MAX_WIDTH = 110
 """Longest line [characters]."""
 
-PrintBody = Callable[[casadi.Function, Sequence[str], Sequence[str]], str]
-"""(function, places of its inputs, places of its outputs) -> its body in C."""
+PrintBody = Callable[[Formula, Sequence[str], Sequence[str]], str]
+"""(formula, places of its inputs, places of its outputs) -> its body in C."""
 
 
 def function_head(head: str, parameters: Sequence[str]) -> str:

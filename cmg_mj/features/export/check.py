@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import copy
 import math
+import operator
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import casadi
 import numpy as np
 
 from cmg_mj.core.arrays import clip
 from cmg_mj.core.axis import AxisControl, Delivered
 from cmg_mj.core.errors import InputError, RunStopped
+from cmg_mj.core.straight_line import PYTHON, compiled, print_operations
 from cmg_mj.core.types import STATE_SIGNALS, reads_gyro
-from cmg_mj.features.export.c_code import Precision
+from cmg_mj.features.export.c_code import CALLS, Precision
 from cmg_mj.features.export.compiler import build, run
 from cmg_mj.features.export.constants import Constants
-from cmg_mj.features.export.symbol import LawNotExportable
-from cmg_mj.features.export.trace import Traced, law_arguments
+from cmg_mj.features.export.formula import Formula
+from cmg_mj.features.export.trace import LawNotExportable, Traced, law_arguments
 from cmg_mj.laws import StateFeedback
 from cmg_mj.linear.slopes import law_slopes
 
@@ -83,35 +84,73 @@ def in_python(controller: AxisControl, samples: np.ndarray) -> np.ndarray:
     return np.array(rows)
 
 
-def in_casadi(controller: AxisControl, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
+CALLED = (*CALLS, "divide")
+"""NumPy's functions that are called where a formula is computed, because Python's own raise."""
+OTHERWISE = {"divide": operator.truediv, **{name: getattr(np, name) for name in ("hypot", "floor", "ceil", "rint")}}
+"""Those of them that `math` rounds otherwise than math.h, or does not have."""
+WORDS = {
+    **PYTHON,
+    **{name: f"{name}({{0}})" if getattr(np, name).nin == 1 else f"{name}({{0}}, {{1}})" for name in CALLED},
+    "bitwise_and": PYTHON["logical_and"],
+    "bitwise_or": PYTHON["logical_or"],
+}
+"""NumPy's function -> Python on floats, which rounds as C does."""
+
+
+def as_in_c(name: str) -> Callable[..., float]:
+    """Find what C computes by NumPy's name: NaN or infinity where Python raises."""
+    in_numpy = getattr(np, name)
+    function = OTHERWISE[name] if name in OTHERWISE else getattr(math, CALLS[name])
+
+    def call(*arguments: float) -> float:
+        try:
+            return float(function(*arguments))
+        except (ArithmeticError, ValueError):
+            return float(in_numpy(*arguments))
+
+    return call
+
+
+def in_floats(formula: Formula) -> Callable[..., list[float]]:
+    """Compile a formula as a function of floats."""
+    texts, lines = print_operations(formula.tape, formula.outputs, WORDS)
+    names = [formula.tape.operations[place].value for place in formula.inputs]
+    results = ", ".join(f"float({texts[place]})" for place in formula.outputs)
+    known = {"inf": math.inf, "nan": math.nan, **{name: as_in_c(name) for name in CALLED}}
+    return compiled("formula", names, [*lines, f"return [{results}]"], known)
+
+
+@np.errstate(all="ignore")
+def in_formulas(controller: AxisControl, traced: Traced, constants: Constants, samples: np.ndarray) -> np.ndarray:
     """Compute the estimates and u by the traced formulas, in the order of the C, (n, 4 + extra signals).
 
     Raises:
         InputError: A number of the state is not finite.
         LawNotExportable: A number of the law's state is not finite.
     """
-
-    def values(function: casadi.Function, *arguments: float) -> list[float]:
-        return [float(value) for value in function.call(arguments)]
-
+    law = traced.law
+    measure, init, step, law_step = map(in_floats, (traced.measure, traced.init, traced.step, law.step))
+    law_init = None if law.init is None else in_floats(law.init)
     of_measure, of_law = ([part.value for part in parts] for parts in (constants.of_measure, constants.of_law))
-    law, limit, extra, n = traced.law, of_law[-1], len(controller.extra_signals[0]), len(traced.state)
+    limit = of_law[-1]
+    extra = len(controller.extra_signals[0])
+    n = len(traced.state)
     end = 4 + constants.gimbals
     law_state, law_constants = [*law.state, "x_e"][: law.numbers], of_law if law.is_state_feedback else []
     state, memory, rows, u = [0.0], [0.0], [], 0.0
     for k, row in enumerate(samples.tolist()):
-        y = [*values(traced.measure, *row[:end], *of_measure), *row[end:]]
+        y = [*measure(*row[:end], *of_measure), *row[end:]]
         if k == 0:
-            state, estimate = values(traced.init, *y), [y[0], 0.0, y[1], *[0.0] * extra]
-            memory = memory if law.init is None else values(law.init, *y[:3])
+            state, estimate = init(*y), [y[0], 0.0, y[1], *[0.0] * extra]
+            memory = memory if law_init is None else law_init(*y[:3])
         else:
-            result = values(traced.step, *state, *y, u)
+            result = step(*state, *y, u)
             state, estimate = result[:n], result[n:]
         if k < constants.trimmed:
             memory[-1] = constants.trim_gain.value * estimate[constants.trim_part]
         x1, x3 = (y[0], y[1]) if controller.angle_source == "measured" else (estimate[0], estimate[2])
         known = dict(zip(law_arguments(extra), [*y[:3], x1, estimate[1], x3, *estimate[3:], u], strict=True))
-        u, *memory = values(law.step, *(known[name] for name in law.arguments), *memory, *law_constants)
+        u, *memory = law_step(*(known[name] for name in law.arguments), *memory, *law_constants)
         u = clip(u, -limit, limit)
         for refusal, names, numbers in ((InputError, traced.state, state), (LawNotExportable, law_state, memory)):
             for name, value in zip(names, numbers, strict=True):
@@ -173,7 +212,7 @@ def check_trace(controller: AxisControl, traced: Traced, constants: Constants, s
             raise _refusal(controller, np.argwhere(differs)[0, 1])(
                 "in Python it is not twice the same on the same signals, so that nothing can be compared"
             )
-        off = np.abs(in_casadi(controller, traced, constants, samples) - expected)
+        off = np.abs(in_formulas(controller, traced, constants, samples) - expected)
         share = off / np.maximum(allowed(controller, samples, expected, "double"), np.finfo(float).tiny)
         if not np.all(share <= 1.0):
             tick, part = np.argwhere(~(share <= 1.0))[0]

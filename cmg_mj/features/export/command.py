@@ -44,9 +44,7 @@ def export(
 
     The C code is compared with Python on random signals before it is written.
     """  # noqa: D301  (click wants the character itself)
-    from cmg_mj.features.export import check_installed, generate_code, write_code
-
-    check_installed()  # which the modules below import
+    from cmg_mj.features.export import generate_code, write_code
     from cmg_mj.features.export.names import name_of
     from cmg_mj.features.export.pipeline import export_table
     from cmg_mj.linear.verdict import require_stable_period

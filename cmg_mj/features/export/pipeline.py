@@ -13,13 +13,12 @@ from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError, raised, shown
 from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import check
-from cmg_mj.features.export.c_code import Precision, operations
+from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.constants import class_path, constants_of
 from cmg_mj.features.export.names import name_of
-from cmg_mj.features.export.symbol import LawNotExportable
-from cmg_mj.features.export.trace import trace
+from cmg_mj.features.export.trace import LawNotExportable, trace
 from cmg_mj.results.folder import write_text
 from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import Trim
@@ -100,9 +99,9 @@ def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
         "files": list(files),
         "numbers_in_state": len(traced.state),
         "operations": {
-            "measure": operations(traced.measure),
-            "step": operations(traced.step),
-            "law": operations(traced.law.step),
+            "measure": traced.measure.operations(),
+            "step": traced.step.operations(),
+            "law": traced.law.step.operations(),
         },
         "trace_off_by": off,
         "compiler": None if compiler is None else shlex.join(compiler),

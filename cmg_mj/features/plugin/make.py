@@ -14,7 +14,6 @@ from typing import Any, Literal, NamedTuple, Unpack
 import mujoco
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export import check_installed
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.names import name_of
 from cmg_mj.features.plugin.driver import PluginLoop
@@ -70,9 +69,8 @@ def plugin(
         What was written.
 
     Raises:
-        InputError: Something in use cannot be exported, the control period is too long, CasADi is missing, or the
-            folder holds files of the user's that would be overwritten. Without a compiler, all but the library is
-            written.
+        InputError: Something in use cannot be exported, the control period is too long, or the folder holds files of
+            the user's that would be overwritten. Without a compiler, all but the library is written.
     """
     experiment = scenario if isinstance(scenario, Experiment) else prepare(scenario)
     require_stable_periods(experiment)
@@ -83,10 +81,9 @@ def require_tools() -> None:
     """Require what a plugin is made with, before anything is computed.
 
     Raises:
-        InputError: CasADi or a compiler is missing, or the platform is not supported.
+        InputError: A compiler is missing, or the platform is not supported.
     """
     check_platform()
-    check_installed()
     if find_compiler() is None:
         raise InputError("plugin: there is no C compiler: install gcc or clang, or name one in CC")
 

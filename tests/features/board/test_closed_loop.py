@@ -23,10 +23,10 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
-from tests.features.board.toy import SHORT, available, short
+from tests.features.board.toy import SHORT, needs_board, short
 from tests.tiers import slow_but
 
-pytestmark = pytest.mark.skipif(not available, reason="the cross-compiler, QEMU or CasADi is not installed")
+pytestmark = needs_board
 
 
 @pytest.fixture(autouse=True)

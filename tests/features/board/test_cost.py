@@ -10,11 +10,11 @@ import pytest
 
 from cmg_mj.papers.aranovskiy2020 import riccati
 from tests.command import HANGS_AFTER_S, ROOT
-from tests.features.board.toy import available
+from tests.features.board.toy import needs_board
 
 SCRIPT = ROOT / "benchmarks" / "board.py"
 
-pytestmark = pytest.mark.skipif(not available, reason="the cross-compiler, QEMU or CasADi is not installed")
+pytestmark = needs_board
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Without the cross-compiler, the emulator or CasADi: one line that says what to install."""
+"""Without the cross-compiler or the emulator: one line that says what to install."""
 
 from __future__ import annotations
 

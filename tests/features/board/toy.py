@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -11,8 +10,6 @@ from cmg_mj.features.board.image import build, missing
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 
-available = not missing() and find_spec("casadi") is not None
-"""Whether a controller can be exported, built and emulated here."""
 needs_board = pytest.mark.skipif(bool(missing()), reason=f"not installed: {', '.join(missing())}")
 
 SHORT = ("duration_s=0.5", "plant.initial_tilt_deg=0.5", "push=[]")

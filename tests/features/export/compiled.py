@@ -17,8 +17,6 @@ from cmg_mj.core.controller import Controller
 from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import export
 
-pytest.importorskip("casadi", reason="casadi is not installed: the extra [export]")
-
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
 

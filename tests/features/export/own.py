@@ -135,6 +135,29 @@ class Remembers(Plain):
         return (), (y.y1, rate, y.y2)
 
 
+class RemembersInAGlobal(Plain):
+    first: list[Any] = []  # noqa: RUF012  (of the class, so that it outlives the observer)
+
+    def init(self, y: Measurement) -> Any:
+        self.first.append(y.y1)
+        return ()
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        rate = (y.y1 - self.first[0]) / self.dt
+        return (), (y.y1, rate, y.y2)
+
+
+class RemembersForNothing(Plain):
+    def init(self, y: Measurement) -> Any:
+        self.last = y.y1
+        return super().init(y)
+
+    def step(self, state: Any, y: Measurement, u: float) -> tuple[Any, Any]:
+        self.change = y.y1 - self.last
+        self.last = y.y1
+        return super().step(state, y, u)
+
+
 class Counts(Plain):
     samples = 0
 

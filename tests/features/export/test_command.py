@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.export import check_installed, export, generate_code, write_code
+from cmg_mj.features.export import export, generate_code, write_code
 from cmg_mj.results import folder
 from tests.command import cmg_mj
 from tests.features.export.compiled import compile_c, controller, needs_compiler
@@ -162,16 +160,3 @@ def test_large_gains_amplify_rounding_and_are_still_looked_at(monkeypatch: pytes
         Path("changed.c").write_text(text)
         compile_c(f"-I{header.parent}", "changed.c", example, "-lm", "-o", "changed")
         assert subprocess.run(["./changed"], capture_output=True, check=False).returncode == status
-
-
-def test_without_casadi_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    genuine = importlib.util.find_spec
-
-    def find_all_but_casadi(name: str, *arguments: Any) -> Any:
-        return None if name == "casadi" else genuine(name, *arguments)
-
-    monkeypatch.setattr("cmg_mj.features.export.find_spec", find_all_but_casadi)
-    with pytest.raises(InputError, match=r'casadi is not installed: python -m pip install "cmg_mj\[export\]"'):
-        check_installed()
-    assert 'pip install "cmg_mj[export]"' in cmg_mj("export", "linear", "--out", "board").complaint
-    assert not Path("board").exists()

@@ -6,19 +6,20 @@ import ctypes
 import math
 import re
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cmg_mj.core.tape import RECORDED, Tape
+from cmg_mj.features.export.c_code import body, literal
+from cmg_mj.features.export.check import in_floats
+from cmg_mj.features.export.formula import Formula, formula, symbols
 from tests.features.export.compiled import compile_c, needs_compiler
 
-import casadi  # isort: skip  (skipped above where it is missing)
-
-from cmg_mj.features.export.c_code import body, literal  # isort: skip
-from cmg_mj.features.export.symbol import OPERATIONS, Symbol  # isort: skip
-from cmg_mj.features.export.symbol import as_written  # isort: skip
+FUNCTIONS = [getattr(np, name) for name in sorted(RECORDED)]
 
 
 @pytest.mark.parametrize("value", [0.1, -1.0 / 3.0, 1e-200, 5e-324, 1.7976931348623157e308, 35.0, 0.0, -0.0, 1e22])
@@ -53,20 +54,19 @@ def test_what_is_nearly_zero_or_very_large_stays_so() -> None:
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_every_operation_does_what_numpy_does(precision: Any, tmp_path: Path) -> None:
     logical = {np.bitwise_and: np.logical_and, np.bitwise_or: np.logical_or, np.invert: np.logical_not}
-    with as_written():
-        a, b = symbols()
-        results = [f(*(a, b)[: f.nin]) for f in OPERATIONS] + formulas(a, b)
-        function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in results])
-    run = compile_function(function, precision, tmp_path)
+    traced = trace(lambda a, b: [f(*(a, b)[: f.nin]) for f in FUNCTIONS] + formulas(a, b))
+    run, in_python = compile_function(traced, precision, tmp_path), in_floats(traced)
     rng, kind = np.random.default_rng(1), np.float64 if precision == "double" else np.float32
     pairs = [*rng.uniform(-1.5, 1.5, (50, 2)), (0.0, 0.0), (0.7, 0.7), (1.0, 0.0), (0.0, -1.0), (1.0, 1.0)]
     with np.errstate(all="ignore"):
         for pair in pairs:
             a, b = map(kind, pair)
-            expected = [logical.get(f, f)(*(a, b)[: f.nin]) for f in OPERATIONS] + formulas(a, b)
+            expected = [logical.get(f, f)(*(a, b)[: f.nin]) for f in FUNCTIONS] + formulas(a, b)
             np.testing.assert_allclose(
                 run(a, b), np.array(expected, dtype=float), rtol=1e-15 if kind is np.float64 else 5e-7
             )
+            if kind is np.float64:
+                np.testing.assert_array_equal(run(a, b), in_python(float(a), float(b)))
 
 
 def formulas(a: Any, b: Any) -> list[Any]:
@@ -79,18 +79,14 @@ def formulas(a: Any, b: Any) -> list[Any]:
 @needs_compiler
 def test_what_is_nan_does_not_become_a_limit(tmp_path: Path) -> None:
     """As fmax would have it: a board would go on with the largest rate."""
-    with as_written():
-        a, b = symbols()
-        results = np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)
-        function = casadi.Function("f", [a.sx, b.sx], [x.sx for x in results])
-    assert np.isnan(compile_function(function, "double", tmp_path)(math.nan, 0.0)).all()
+    limited = trace(lambda a, b: [np.clip(a, -4.7, 4.7), np.maximum(0.0, a), np.minimum(a, 1.0)])
+    assert np.isnan(compile_function(limited, "double", tmp_path)(math.nan, 0.0)).all()
+    assert np.isnan(in_floats(limited)(math.nan, 0.0)).all()
 
 
 @needs_compiler
 def test_an_output_may_take_the_place_of_an_input(tmp_path: Path) -> None:
-    with as_written():
-        a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
-        lines = body(casadi.Function("f", [a, b], [b, a]), ["x[0]", "x[1]"], ["x[0]", "x[1]"], "double", "double")
+    lines = body(trace(lambda a, b: [b, a]), ["x[0]", "x[1]"], ["x[0]", "x[1]"], "double", "double")
     source = tmp_path / "swap.c"
     source.write_text(f"void f(double x[2]);\nvoid f(double x[2])\n{{\n{chr(10).join(lines)}\n}}\n")
     compile_c("-shared", "-fPIC", source, "-o", tmp_path / "swap.so")
@@ -99,14 +95,17 @@ def test_an_output_may_take_the_place_of_an_input(tmp_path: Path) -> None:
     assert x.tolist() == [2.0, 1.0]
 
 
-def symbols() -> list[Any]:
-    return [Symbol(casadi.SX.sym(name)) for name in "ab"]
+def trace(function: Callable[[Any, Any], list[Any]]) -> Formula:
+    """The formula of a function of two numbers."""
+    tape = Tape()
+    a, b = symbols(tape, 2)
+    return formula(tape, [a, b], function(a, b))
 
 
-def compile_function(function: casadi.Function, precision: Any, folder: Path) -> Any:
+def compile_function(formula: Formula, precision: Any, folder: Path) -> Any:
     """A function of a and b as C, called with two numbers."""
-    n, real = function.n_out(), "double" if precision == "double" else "float"
-    lines = body(function, ["a", "b"], [f"x[{i}]" for i in range(n)], real, precision)
+    n, real = len(formula.outputs), "double" if precision == "double" else "float"
+    lines = body(formula, ["a", "b"], [f"x[{i}]" for i in range(n)], real, precision)
     head = f"void f({real} a, {real} b, {real} x[{n}])"
     text = f"#include <math.h>\n{head};\n{head}\n{{\n(void)b;\n{chr(10).join(lines)}\n}}\n"
     (folder / "f.c").write_text(text)

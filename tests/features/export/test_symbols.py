@@ -10,37 +10,54 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.tape import Symbol, Tape
 from cmg_mj.core.tree import form, numbers, rebuild
+from cmg_mj.features.export.check import in_floats
+from cmg_mj.features.export.formula import formula
+from cmg_mj.features.export.names import identifiers, name_of
+from cmg_mj.features.export.pipeline import generate_code
 from cmg_mj.observers import Measurement
 from tests.features.export import own
 from tests.features.export.compiled import controller
 from tests.test_elementwise import FUNCTIONS, SPECIAL
 
-import casadi  # isort: skip  (skipped above where it is missing)
 
-from cmg_mj.features.export.symbol import Symbol  # isort: skip
-from cmg_mj.features.export.symbol import as_written  # isort: skip
-from cmg_mj.features.export.names import name_of  # isort: skip
-from cmg_mj.features.export.names import identifiers  # isort: skip
-from cmg_mj.features.export.pipeline import generate_code  # isort: skip
+def symbol() -> Any:
+    return Tape().input("x")
 
 
-def symbol(name: str = "x") -> Any:
-    return Symbol(casadi.SX.sym(name))
+def traced(function: Callable) -> Callable[[float], float]:
+    """The function of a number, by its recorded operations."""
+    x = symbol()
+    computed = in_floats(formula(x.tape, [x], [function(x)]))
+    return lambda value: computed(value)[0]
 
 
-TRACEABLE = [function for function in FUNCTIONS if function.id not in ("round", "digitise")]
-"""All but those that only sensors need."""
-
-
-@pytest.mark.parametrize("function", TRACEABLE)
+@pytest.mark.parametrize("function", FUNCTIONS)
 def test_a_symbol_equals_floats_bit_by_bit(function: Callable) -> None:
     """But for the sign of a zero, as with arrays."""
-    x = symbol()
-    with as_written():
-        graph = casadi.Function("f", [x.sx], [function(x).sx])
     values = [*SPECIAL, *np.random.default_rng(3).normal(0.0, 1.0, 200).tolist()]
-    assert [float(graph(value)) for value in values] == [function(value) for value in values]  # type: ignore[arg-type]
+    assert list(map(traced(function), values)) == list(map(function, values))
+
+
+@pytest.mark.parametrize(
+    ("function", "value", "expected"),
+    [
+        (lambda x: 1.0 / x, -0.0, -math.inf),
+        (lambda x: x / x, 0.0, math.nan),
+        (np.sqrt, -1.0, math.nan),
+        (np.log, 0.0, -math.inf),
+        (np.exp, 1e3, math.inf),
+        (np.sinh, -1e3, -math.inf),
+        (lambda x: x**0.5, -2.0, math.nan),
+        (lambda x: np.float_power(x, 3.0), -1e200, -math.inf),
+        (np.floor, -math.inf, -math.inf),
+        (np.rint, math.nan, math.nan),
+    ],
+)
+def test_where_python_raises_a_formula_has_what_c_has(function: Callable, value: float, expected: float) -> None:
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(traced(function)(value), expected)
 
 
 def test_numpys_numbers_and_arrays_on_the_left() -> None:
@@ -54,17 +71,29 @@ def test_numpys_numbers_and_arrays_on_the_left() -> None:
     assert isinstance(np.sin(column)[1], Symbol)
 
 
-@pytest.mark.parametrize("name", ["Elaborate", "Branches"])
-def test_casadi_is_left_as_it_was(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_simplified() -> None:
+    """What is equal on paper may round otherwise."""
+    x = symbol()
+    results = {"add": x + 0.0, "multiply": 1.0 * x, "subtract": x - x, "power": x**2, "negative": np.negative(-x)}
+    for name, result in results.items():
+        assert x.tape.operations[result.place].name == name
+    assert (x + 0.0).place == results["add"].place  # but equal ones are one
+
+
+def test_what_is_remembered_in_a_global_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A symbol of an earlier export has a place that means another number now."""
     monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
-    for before in (True, False):
-        casadi.GlobalOptions.setSimplificationOnTheFly(before)
-        try:
-            generate_code(controller(f"tests.features.export.own:{name}"), "double")
-        except InputError:
-            assert name == "Branches"
-        assert casadi.GlobalOptions.getSimplificationOnTheFly() is before
-    casadi.GlobalOptions.setSimplificationOnTheFly(True)
+    observer = "tests.features.export.own:RemembersInAGlobal"
+    with pytest.raises(InputError, match="remembers something outside of its state"):
+        generate_code(controller(observer), "double")
+    with pytest.raises(InputError, match=r"remembered from an earlier recording \(.*own.py, line \d+: rate = "):
+        generate_code(controller(observer), "double")
+
+
+def test_what_is_remembered_and_not_used_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
+    code = generate_code(controller("tests.features.export.own:RemembersForNothing"), "double")
+    assert code.figures["trace_off_by"] == 0.0
 
 
 def test_a_state_is_taken_apart_and_put_together() -> None:
@@ -118,4 +147,4 @@ def test_a_symbol_has_no_value() -> None:
             conversion(symbol())
     with pytest.raises(TypeError):
         hash(symbol())
-    assert repr(symbol("tilt")) == "Symbol(tilt)"
+    assert repr(symbol()) == "Symbol(0)"
