@@ -144,8 +144,8 @@ class ScissoredPairEnv(gymnasium.Env):
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
         acting = disturbances(outsides(scenario), [plant], seed, self._world)
-        if any(one.accelerates for one in acting):
-            plant = plant.with_own_model()
+        for one in acting:
+            (plant,) = one.placed([plant])
         self._physics = OneWorld(plant)
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, world_ids=self._world

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
@@ -131,7 +132,7 @@ def pivot_signal(pivot: Pivot, number: int, seed: int, world_ids: int | Sequence
     return mean
 
 
-class PivotSignals:
+class PivotSignals(Disturbance):
     """The acceleration of the pivot in time, the sum of all motions; as a disturbance its mean until the next instant.
 
     Args:
@@ -141,10 +142,6 @@ class PivotSignals:
         world_ids: The number of one world, or the numbers of many: noise depends on (seed, number) alone.
         timestep: Physics step of the disturbance [s].
     """
-
-    edges: Sequence[int] = ()
-    accelerates = True
-    actuators: Sequence[int] = ()
 
     def __init__(
         self,
@@ -165,6 +162,10 @@ class PivotSignals:
             acceleration = signal(start, end)
             total = [part + along * acceleration for part, along in zip(total, direction, strict=True)]
         return total
+
+    def placed(self, plants: Sequence[Any]) -> Sequence[Any]:
+        """See `Disturbance`: gravity changes; many worlds have their own of the batch."""
+        return [plants[0].with_own_model()] if len(plants) == 1 else plants
 
     def at(self, step: int, steps: int) -> Outside:
         """Return the acceleration: see `Disturbance`."""

@@ -16,7 +16,6 @@ from cmg_mj.core.controller import ControllerState
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import acting, next_instant
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
-from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.inputs.types import MAX_TIME_S
 from cmg_mj.plant.mjcf import set_control_callback
@@ -127,13 +126,13 @@ class StudioSession:
     def __init__(self, experiment: Experiment) -> None:
         self.base = self.now = experiment
         self.plant, scenario = drawn_plant(experiment.plant), experiment.scenario
-        for name, make in entries("in_world").items():
-            self.plant = make(scenario.section(name), self.plant, scenario.seed, 0)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
         self._users_pushes: list[Push] = []
-        others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
-        self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
+        others = {name: parts for name, parts in outsides(scenario).items() if name != "push"}
+        self._others = disturbances(others, [self.plant], scenario.seed, 0)
+        for one in self._others:
+            (self.plant,) = one.placed([self.plant])
         self._gravity = self.model.opt.gravity.copy()
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._saved: dict[int, ControllerState] = {}
