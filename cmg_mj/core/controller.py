@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Delivered, Sampled, Tick
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.noise import Normals
 from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding, ideals_of
 from cmg_mj.core.straight_line import Tables, straight_line
@@ -251,7 +251,7 @@ class Controller:
         try:
             *trees, tables = arguments
             self._printed[phase] = straight_line(function, trees, tables, finite)
-        except InputError:
+        except (InputError, RunStopped):  # no formula of floats alone, such as one with a branch on them
             self._print_from = math.inf
             return function
         return self._printed[phase]

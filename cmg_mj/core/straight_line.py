@@ -91,8 +91,8 @@ class _Recorder:
         if type(tree) is int:
             name = self._name("i")
             return name, Count(tree, name)
-        if not isinstance(tree, (tuple, list)):
-            return "_", tree
+        if tree is not None and not isinstance(tree, (tuple, list)):
+            raise InputError(f"{type(tree).__name__}: a straight line takes floats and whole numbers alone")
         if not tree:
             return "_", tree
         patterns, parts = zip(*map(self.given, tree), strict=True)

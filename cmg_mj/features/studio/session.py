@@ -155,14 +155,18 @@ class StudioSession:
 
     def begin(self) -> None:
         """Begin a run at the present state, with a fresh controller."""
-        step = round(self.data.time / self.timestep)
-        self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
         self.ticks.clear()
-        self._saved.clear()
-        self.diverged = False
+        self._go_to(round(self.data.time / self.timestep))
+        self._start_controller()
+
+    def _go_to(self, step: int) -> None:
+        """Take a step for the present one; later pushes and ticks are forgotten."""
         self._next = step
         """The next step, unless someone moves the state in time."""
-        self._start_controller()
+        self.diverged = False
+        self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
+        while self.ticks and self.ticks[-1][0].time_s > self.data.time - 1e-9:
+            self.ticks.pop()
 
     def _start_controller(self) -> None:
         self.controller = self.now.controller()
@@ -204,12 +208,10 @@ class StudioSession:
             self.begin()
             self.note = f"the controller starts afresh at t = {self.data.time:g} s"
             return step
+        self._go_to(step)
+        self._set_pushes()
         self.controller.state = saved
         self.stopped = self.note = ""
-        self.diverged = False
-        self._next = self._acts_until = step
-        while self.ticks and self.ticks[-1][0].time_s > self.data.time - 1e-9:
-            self.ticks.pop()
         return step
 
     def step(self) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.loop import Outside, instants
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.moving_pivot import pivot_directions
@@ -60,13 +59,13 @@ def test_equals_a_base_that_slide_joints_drive(scenario: str, settings: list[str
     axis = plant.axis_names[0] or None
     pivots = [Pivot(**{**vars_of(pivot), "axis": axis}) for pivot in ALL_WAYS]
     shifted, driven = OneWorld(plant), DrivenBase(plant)
-    steps, per_sample, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
+    steps, held, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
 
     move = PivotSignals(pivots, pivot_directions(plant, pivots), 0, 0, h)
 
     joints, readings = [], []
-    for step, held in instants(steps, per_sample):
-        acceleration = move(step, held, Outside([0.0])).acceleration
+    for step in range(0, steps, held):
+        acceleration = move.at(step, held).acceleration
         assert acceleration is not None
         shifted.accelerate(acceleration)
         driven.accelerate(acceleration)
