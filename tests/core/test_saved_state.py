@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 
-from cmg_mj.core.controller import PRINTED_AFTER, Controller
+from cmg_mj.core.controller import PRINTED_AFTER
 from cmg_mj.core.types import IdealReading
 from tests.core.test_straight_line import LATE, TRIMMED, VIBRATION
 from tests.recorded import push_recovery
 from tests.sensors.test_accelerometer import ALL
-
-PERIOD = 5
-"""Physics steps in a control period."""
 
 
 def reading(step: int) -> IdealReading:
@@ -22,21 +19,20 @@ def reading(step: int) -> IdealReading:
     return IdealReading((x, z, x, z), gimbals, 0.15 * tilt, 0.15 * tilt, (314.0 + tilt, -314.0 + tilt))
 
 
-def states(controller: Controller, first: int, ticks: int) -> list[str]:
-    """Return the states that follow, as text: to the last bit, and NaN equals NaN."""
-    after = []
-    for step in range(first, first + ticks * PERIOD, controller.steps_per_sample):
-        controller.update(step, reading(step))
-        after.append(repr(controller.state))
-    return after
-
-
 def test_an_assigned_state_repeats_what_followed() -> None:
-    """From before the straight line and from after it, in any order; every effect has a memory of its own."""
+    """200 ticks bit for bit, from the straight line and from before it; every effect has a memory of its own."""
     stages = "plant.gimbal_backlash_arcmin=10", "controller.notch_hz=20"
     controller = push_recovery(*ALL, *VIBRATION, *LATE, *TRIMMED, *stages, "plant.timestep_s=0.001").controller()
-    assert controller.period == PERIOD
-    settled = controller.axes[0].settled // PERIOD + PRINTED_AFTER
-    saved, followed = {}, {}
-    for tick in (20, settled + 40):
-        states(controller, (controller.step or 0) + 1, 0)
+    assert (controller.steps_per_sample, controller.period) == (1, 5)
+    printed = controller.axes[0].settled + PRINTED_AFTER * controller.period
+    saved, shown = [], []
+    for step in range(printed + 1200):
+        controller.update(step, reading(step))
+        saved.append(controller.state)
+        shown.append(repr(controller.state))  # to the last bit, and NaN equals NaN
+    assert controller._printed
+    for start in (printed + 103, 101):
+        controller.state = saved[start]
+        for step in range(start + 1, start + 1001):
+            controller.update(step, reading(step))
+            assert repr(controller.state) == shown[step]
