@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from cmg_mj.core.axis import Tick
+from cmg_mj.core.axis import Known, Tick
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.loop import ControlLoop, Disturbance
+from cmg_mj.core.loop import ControlLoop, Disturbance, Outside
 from cmg_mj.core.rig import AxesOrders, AxesStage
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import MultiAxisReading
@@ -27,7 +27,11 @@ class Walk(AxesStage):
     """Turns the gimbals faster by a rate [rad/s], knows a tilt and a bias, and moves actuators."""
 
     rate: float = 0.0
-    actuators: Sequence[int] = ()
+    servos: Sequence[int] = ()
+
+    @property
+    def actuators(self) -> Sequence[int]:
+        return self.servos
 
     def step(
         self,
@@ -40,7 +44,7 @@ class Walk(AxesStage):
     ) -> tuple[Any, AxesOrders]:
         rates = [rate + self.rate for rate in orders.rates]
         known = [before._replace(tilt=0.1, bias=0.2) for before in orders.known]
-        setpoints = [*orders.setpoints, *(float(actuator) for actuator in self.actuators)]
+        setpoints = [*orders.setpoints, *(float(actuator) for actuator in self.servos)]
         return memory, orders._replace(rates=rates, known=known, setpoints=setpoints)
 
 
@@ -56,6 +60,14 @@ def first_tick(*between: AxesStage) -> Controller:
     return controller
 
 
+def known(controller: Controller) -> Known:
+    """Return what the first axis knows of its next measurement."""
+    assert controller.state.deciding is not None
+    before, _ = controller.state.deciding.axes
+    assert before.known is not None
+    return before.known
+
+
 def test_turning_after_a_gait_is_the_sum_of_both() -> None:
     (turning,) = TWO_AXES.controller().rig.between
     alone, walk, both = (first_tick(*between) for between in ([turning], [Walk(0.01)], [Walk(0.01), turning]))
@@ -65,25 +77,28 @@ def test_turning_after_a_gait_is_the_sum_of_both() -> None:
     assert min(map(abs, turned)) > 1e-3
     sums = [u + 0.01 + rate for u, rate in zip(laws, turned, strict=True)]
     assert both.gimbal_rates == pytest.approx(sums, rel=1e-12)
-    of_both, of_turning = (each.state.deciding.axes[0].known for each in (both, alone))  # type: ignore[union-attr]
+    of_both, of_turning = (known(each) for each in (both, alone))
     assert of_both == of_turning._replace(tilt=0.1, bias=0.2)
     assert abs(of_both.acceleration) > 0.1
 
 
 def test_every_stage_moves_its_own_actuators() -> None:
-    controller = first_tick(Walk(actuators=(7, 3)), Walk(actuators=(5,)))
+    controller = first_tick(Walk(servos=(7, 3)), Walk(servos=(5,)))
     assert controller.setpoints == ([7, 3, 5], [7.0, 3.0, 5.0])
     with pytest.raises(InputError, match="two stages between the axes move the same actuator"):
-        first_tick(Walk(actuators=(7, 3)), Walk(actuators=(3,)))
+        first_tick(Walk(servos=(7, 3)), Walk(servos=(3,)))
 
 
 class Track(Disturbance):
     actuators = (3,)
 
+    def at(self, step: int, steps: int) -> Outside:
+        return Outside()
+
 
 def test_a_track_and_a_stage_do_not_move_the_same_actuator() -> None:
     for moved in (5, 3):
-        controller = first_tick(Walk(actuators=(moved,)))
+        controller = first_tick(Walk(servos=(moved,)))
         arguments = OneWorld(TWO_AXES.plant), controller, 100, [Track()], 1.0
         if moved == 5:
             ControlLoop(*arguments)
