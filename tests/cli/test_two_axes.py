@@ -139,7 +139,28 @@ def test_check_says_what_each_axis_amounts_to() -> None:
     assert outcome.out.count(": valid") == 2
     assert "two_axes, axis roll" in outcome.out
     assert "equilibrium bias -0.3 deg" in outcome.out
-    assert "push        1 N m about pitch from 6 s to 6.1 s" in outcome.out
+    assert outcome.out.count("push        1 N m about pitch from 6 s to 6.1 s") == 1
+
+
+SHAKEN = "sensors.accelerometer.averaged=false"
+
+
+def test_what_is_of_the_robot_is_said_once() -> None:
+    (hint,) = prepare(load_scenario("walk", [SHAKEN])).hints
+    assert hint.startswith("[gait]: the legs' servos shake accelerometers that show instants")
+    out = cmg_mj("check", "walk", "--set", SHAKEN).out
+    shared = out.partition("walk, on all axes\n")[2]
+    assert [line.split()[0] for line in shared.splitlines()] == ["omitted", "gait", "hint"]
+    assert out.count(hint) == 1
+
+
+def test_a_push_beyond_the_ceiling_is_said_of_its_own_axis() -> None:
+    (hint,) = two_axes("push.0.torque_n_m=30").hints
+    assert hint.startswith("roll: push.0.torque_n_m = 30: no controller recovers from more than 4.84 N m")
+    roll, pitch = cmg_mj("check", "two_axes", "--set", "push.0.torque_n_m=30").out.split("two_axes, axis pitch")
+    assert "no controller recovers from more than" in roll
+    assert "no controller recovers from more than" not in pitch
+    assert two_axes("push.0.torque_n_m=30", 'plant.locked_axes=["roll"]').hints == []
 
 
 def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: dict[str, Any]) -> None:

@@ -108,6 +108,7 @@ def test_users_parts_and_what_branches_run_as_they_are(monkeypatch: pytest.Monke
     ):
         observer = as_the_packages_own(part, monkeypatch) if is_own else part()
         controller = OWN.controller(observer=observer)
+        assert math.isfinite(controller._print_from) == is_own  # nobody knows what a user's looks at
         runs.append(recorded(OWN.simulate(OWN.plant, controller)))
         assert math.isfinite(controller._print_from) == prints
         assert_same_bits(runs[-1], runs[0])

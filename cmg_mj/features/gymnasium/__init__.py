@@ -101,6 +101,10 @@ class ScissoredPairEnv(gymnasium.Env):
         bounds = np.array([math.pi, *[MAX_READING] * (1 + len(self._readings))])
         self.observation_space = gymnasium.spaces.Box(-bounds, bounds, dtype=np.float64)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is copied and pickled, in the middle of an episode too: all but what draws."""
+        return {**self.__dict__, "_renderer": None}
+
     @quiet()
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

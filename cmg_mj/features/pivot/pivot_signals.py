@@ -152,8 +152,13 @@ class PivotSignals(Disturbance):
         timestep: float = 0.0,
     ) -> None:
         self._timestep = timestep
+        self._made_from = pivots, directions, seed, world_ids, timestep
         signals = [pivot_signal(pivot, i, seed, world_ids) for i, pivot in enumerate(pivots)]
         self._parts = list(zip(signals, directions, strict=True))
+
+    def __reduce__(self) -> tuple:
+        """Copy and pickle what it was made from: it is a function of time."""
+        return PivotSignals, self._made_from
 
     def mean(self, start: float, end: float) -> list[Scalar]:
         """Compute the mean acceleration over an interval of the run [s]: x, y, z, each (n_worlds,) if it differs."""

@@ -95,20 +95,16 @@ def test_figures_do_not_depend_on_the_step() -> None:
 
 @LONG
 @pytest.mark.parametrize(("roll", "pitch"), [(0.4, -0.4), (-0.4, 0.4)])
-def test_the_equilibrium_bias_is_found(monkeypatch: pytest.MonkeyPatch, roll: float, pitch: float) -> None:
+def test_the_equilibrium_bias_is_found(roll: float, pitch: float) -> None:
     """Within 0.1 deg, and the torso is moved by all of it."""
-    made: list[stage.Walking] = []
-    start = stage.Walking.__init__
-
-    def remembered(self: stage.Walking, *arguments: object) -> None:
-        start(self, *arguments)  # type: ignore[arg-type]
-        made.append(self)
-
-    monkeypatch.setattr(stage.Walking, "__init__", remembered)
-    walked(4, QUIET, *(f"{field}={e}" for field, e in zip(E_DEG, (roll, pitch), strict=True)))
-    lean = made[-1]._lean
-    np.testing.assert_allclose(np.degrees(np.mean(lean.bias, axis=1)), [roll, pitch], atol=0.1)
-    np.testing.assert_allclose(np.degrees(np.mean(lean.lean, axis=1)), [roll, pitch], atol=0.1)
+    own = [f"{field}={e}" for field, e in zip(E_DEG, (roll, pitch), strict=True)]
+    experiment = prepare(load_scenario("walk", [*own, QUIET]))
+    controller = experiment.controller(range(4))
+    experiment.simulate([experiment.plant] * 4, controller, keep_trajectory=False)
+    assert controller.state.deciding is not None
+    leaning = controller.state.deciding.between[0].leaning
+    np.testing.assert_allclose(np.degrees(np.mean(leaning.bias, axis=1)), [roll, pitch], atol=0.1)
+    np.testing.assert_allclose(np.degrees(np.mean(leaning.lean, axis=1)), [roll, pitch], atol=0.1)
 
 
 def test_tiles_differ_from_world_to_world_and_not_from_run_to_run() -> None:
