@@ -145,4 +145,7 @@ def digitise(x: Scalar, limit: float, step: float) -> Scalar:
             x = copysign(limit, x)
         return round(x / step) * step if step else x
     x = np.minimum(np.maximum(x, -limit), limit)
+    if _traced(x):
+        rounded = (np.rint(x / step) + 0.0) * step  # the sum makes -0 to 0, as in an integer
+        return np.where(step != 0.0, rounded, x) if _traced(step) else rounded if step else x
     return np.rint(x / step) * step if step else x

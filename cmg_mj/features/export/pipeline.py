@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import shlex
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,9 +18,9 @@ from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision
 from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
 from cmg_mj.features.export.compiler import find_compiler
-from cmg_mj.features.export.constants import class_path, constants_of
+from cmg_mj.features.export.constants import Constants, class_path, constants_of
 from cmg_mj.features.export.names import name_of
-from cmg_mj.features.export.trace import LawNotExportable, trace
+from cmg_mj.features.export.trace import LawNotExportable, Traced, trace
 from cmg_mj.results.folder import write_text
 from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import Trim
@@ -41,8 +43,26 @@ class Code(NamedTuple):
 def generate_code(controller: AxisControl, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
     """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
     require_exportable(controller)
-    try:
+    with _named(controller):
         return _generate(controller, precision, name_of(controller.observer, name) + suffix)
+
+
+def require_traceable(controller: AxisControl) -> None:
+    """Refuse an observer or a law that no formula expresses; all else of the controller is left out.
+
+    Raises:
+        InputError: It is none.
+    """
+    trims = tuple(stage for stage in controller.memories if isinstance(stage, Trim))
+    with _named(controller):
+        _traced(replace(controller, commands=(), memories=trims))
+
+
+@contextmanager
+def _named(controller: AxisControl) -> Iterator[None]:
+    """Name the observer or the law in an error."""
+    try:
+        yield
     except LawNotExportable as error:
         raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:
@@ -74,12 +94,16 @@ def _copied(part: Any, refusal: type[InputError]) -> Any:
         raise refusal(f"it cannot be copied: {raised(error)}") from error
 
 
-def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
+def _traced(controller: AxisControl) -> tuple[Traced, Constants, float]:
+    """Trace a controller; return the formulas, their constants, and their difference from Python."""
     for_trace, law_for_trace = _copied(controller.observer, InputError), _copied(controller.law, LawNotExportable)
     constants = constants_of(controller)
     traced = trace(for_trace, law_for_trace, constants)
-    off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
+    return traced, constants, check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
 
+
+def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
+    traced, constants, off = _traced(controller)
     printer = CodePrinter(controller, traced, constants, precision, name)
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)

@@ -1,44 +1,81 @@
-"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files.
-
-Compiles it, and prints what stands beside it.
-"""
+"""Prints a plugin's C and what stands beside it: the recorded rig, the common files; and compiles it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import platform
 import shlex
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.types import reads_gyro
+from cmg_mj.core.rig import RigControl
 from cmg_mj.features.export import compiler as c_compiler
-from cmg_mj.features.export import generate_code
-from cmg_mj.features.plugin.sensors import (
-    PluginAxis,
-    PluginRig,
-    Value,
-    clock_of,
-    describe_axis,
-    describe_mems_gyro,
-    refuse_unsupported,
+from cmg_mj.features.plugin.driver import check_noise
+from cmg_mj.features.plugin.model import QUANTITIES
+from cmg_mj.features.plugin.recording import (
+    SETTINGS,
+    RecordedRig,
+    RecordedSensor,
+    delivered_names,
+    generator,
+    record,
 )
-from cmg_mj.stages.trim import trim_of
+from cmg_mj.plant.plant import Plant
 
-if TYPE_CHECKING:
-    from cmg_mj.features.export.c_files import LawPrinter
+MAX_AXES = 4
+MAX_GIMBALS = 8
+MAX_ESTIMATES = 64
+MAX_CHANNELS = 32
+MAX_WIDTH = 64
+"""Sizes of the C's arrays."""
+HEAD = (
+    *("SEED", "WORLD", "STATUS", "STEPS", "PER_INSTANT", "TIMESTEP"),
+    *("IS_PENDING", "STARTS_SPINNING", "IS_SPINNING_UP", "CHECK"),
+)
+"""The state's first numbers, as rig.h names them."""
+SHOWN = 5
+"""Numbers that are shown of an axis before its estimate."""
+NOISE_WORDS = 8
+"""Numbers of a noise stream's generator."""
+
+Value = int | float | str | Sequence["Value"] | Mapping[str, "Value"]
+"""A value in C; a mapping is a struct, by its fields."""
+Struct = dict[str, Value]
 
 
-COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", "setup.c", "plugin.c")
-COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
+class Name(str):
+    """A name in C, which is no text."""
+
+
+class PluginRig(NamedTuple):
+    """A rig with its controllers.
+
+    Attributes:
+        plant: The plant.
+        control: The controllers of its axes, and what stands between them.
+        plugin: Name under which MuJoCo knows the plugin.
+        seed: Seed of its noise.
+        world: The world whose noise it has.
+    """
+
+    plant: Plant
+    control: RigControl
+    plugin: str
+    seed: int
+    world: int
+
+
+COMMON_SOURCES = ("noise.c", "state.c", "setup.c", "plugin.c")
+COMMON_HEADERS = ("ziggurat.h", "noise.h", "rig.h", "setup.h")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 TESTED_PLATFORM = ("Linux", "glibc")
 FOLDER = files("cmg_mj.features.plugin")
@@ -129,15 +166,6 @@ def c_text(text: str) -> str:
     return f'"{"".join(letters)}"'
 
 
-NAMES_IN_USE = frozenset(
-    """
-    axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
-    setup show spin state mems_gyro turning ziggurat
-    """.split()  # noqa: SIM905
-)
-"""Names that would clash with the C that all plugins have in common."""
-
-
 class PluginCode(NamedTuple):
     """A plugin before it is compiled.
 
@@ -159,177 +187,181 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
 
     Args:
         rig: The rig with its controllers.
-        name: Prefix of the exported controllers in C; of several axes the axis' number follows.
+        name: The plugin's name behind `cmg_mj.`.
 
     Returns:
         The code.
 
     Raises:
-        InputError: Something in use cannot be exported, or the name is none for a plugin.
+        InputError: Something in use cannot be recorded.
     """
-    refuse_unsupported(rig)
-    if name in NAMES_IN_USE:
-        raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
-    files, names = common_files(), []
-    for number, axis in enumerate(rig.axes):
-        suffix = f"_{number}" if len(rig.axes) > 1 else ""
-        own = name + suffix
-        controller = replace(axis.controller, feedback="observer")  # the plugin's own C chooses the rate
-        code = generate_code(controller, "double", name, suffix)
-        files |= {file: code.files[file] for file in (f"{own}.h", f"{own}.c")}
-        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
-        names.append(own)
-    files["rig.c"] = format_rig(rig, names, "")
+    recorded = record(rig.control, rig.plant)
+    refuse_unsupported(rig, recorded)
+    files = common_files()
+    files["rig.c"] = format_rig(rig, recorded, "")
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
-    files["rig.c"] = format_rig(rig, names, build)
-    sources = [*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"]
-    return PluginCode(name, files | extra_files(name, files, sources, rig.axes[0].prefix), sources, build)
+    files["rig.c"] = format_rig(rig, recorded, build)
+    sources = [*COMMON_SOURCES, "rig.c"]
+    prefix = rig.plant.axes[0].prefix
+    return PluginCode(name, files | extra_files(name, files, sources, prefix), sources, build)
 
 
-def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
-    """Print NAME_controller.c, which joins an exported controller to the plugin.
+def refuse_unsupported(rig: PluginRig, recorded: RecordedRig) -> None:
+    """Refuse what is more than the C has room for.
 
-    Args:
-        name: Name of the export.
-        axis: The axis with the controller.
-        observer_numbers: Numbers in the exported observer's state.
-        law: The printer of its law.
-
-    Returns:
-        The text.
+    Raises:
+        InputError: Something is.
     """
-    controller = axis.controller
-    y = "y[0], y[1], y[2], y[3]" if reads_gyro(controller.observer) else "y[0], y[1], y[2]"
-    n, trim, formulas = name, trim_of(controller), law.law
-    gap = controller.plant.backlash
-    trimmed = -(-trim.until // controller.period)
-    fields = {
-        "estimates": 3 + len(controller.extra_signals[0]),
-        "observer": max(1, observer_numbers),
-        "law": max(1, formulas.numbers),
-        "integrator": formulas.numbers - 1 if formulas.has_integrator else -1,
-        "trimmed": trimmed,
-        "trim_part": trim.part if trimmed else 0,
-        "trim_gain": trim.gain if trimmed else 0.0,
-        "angles_are_estimated": int(controller.angle_source == "estimated"),
-        "reads_gyro": int(reads_gyro(controller.observer)),
-        "rate_limit": controller.law.rate_limit,
-        "has_backlash": int(gap > 0.0),
-        "half_gap": gap / 2.0,
-        "period": controller.law.dt,
-    }
-    return f"""/* {n} as the plugin calls it. The exported code is included: its functions are static. */
-#include "{n}.c"
-
-#include "controller.h"
-
-#include <string.h>
-
-static void controller_measure(const double *forces, const double *encoders, double y[3])
-{{
-    measure(forces, encoders, &y[0], &y[1], &y[2]);
-}}
-
-static void observer_init(double *memory, const double y[4])
-{{
-    {n}_state state = {{0}};
-    {n}_init(&state, {y});
-    memcpy(memory, &state, sizeof state);
-}}
-
-static void observer_step(double *memory, const double y[4], double u, double *estimate)
-{{
-    {n}_state state;
-    memcpy(&state, memory, sizeof state);
-    {n}_step(&state, {y}, u, estimate);
-    memcpy(memory, &state, sizeof state);
-}}
-
-{_law_functions(law)}
-extern const controller_type {n}_controller_type;
-const controller_type {n}_controller_type = {{
-{_fields(fields)}    .feedback = FEEDBACK_{controller.feedback.upper()},
-    .measure = controller_measure,
-    .observer_init = observer_init,
-    .observer_step = observer_step,
-    .law_init = law_init,
-    .law_step = law_step,
-}};
-"""
+    counts = [(len(rig.plant.axes), "axes", MAX_AXES)]
+    for axis, control in zip(rig.plant.axes, rig.control.axes, strict=True):
+        counts.append((len(axis.modules), "modules on an axis", MAX_GIMBALS))
+        counts.append((3 + len(control.extra_signals[0]), "estimates", MAX_ESTIMATES))
+    for one in recorded.all_sensors:
+        counts.append((max(len(one.ideal.results), one.width), "numbers of a sensor", MAX_CHANNELS))
+    counts += [(width, "numbers of a noise stream", MAX_WIDTH) for width in rig.control.draws.values()]
+    for count, what, most in counts:
+        if count > most:
+            raise InputError(f"{count} {what}: a plugin takes at most {most}")
+    check_noise(rig.seed, rig.world)
 
 
-def _law_functions(law: LawPrinter) -> str:
-    """Print law_init and law_step, which call the exported law."""
-    formulas, memory = law.law, "memory"
-    if formulas.state:
-        memory = f"&memory[{len(formulas.state)}]"
-    places = {name: f"y[{i}]" for i, name in enumerate(("y1", "y2", "acceleration"))}
-    init = "memory[0] = 0.0 * y[0];" if formulas.is_state_feedback else law.init_call(places, "&state", memory)
-    places |= {name: f"x[{i}]" for i, name in enumerate(("x1", "x2", "x3"))} | {"estimate": "x", "held": "held"}
-    step = law.step_call(places, "&state", memory, "u")
-    state, load, store = f"{law.name}_law_state state", "memcpy(&state, memory, sizeof state);", ""
-    if formulas.state:
-        store = "    memcpy(memory, &state, sizeof state);\n"
-        init, step = f"{state} = {{0}};\n    {init}", f"{state};\n    {load}\n    {step}"
-    return f"""static void law_init(double *memory, const double y[3])
-{{
-    (void)memory, (void)y;
-    {init}
-{store}}}
+class Layout:
+    """Counts places in the state, and remembers those of names."""
 
-static void law_step(double *memory, const double y[3], const double *x, double held, double *u)
-{{
-    (void)memory, (void)y, (void)x, (void)held;
-    {step}
-{store}}}
-"""
+    def __init__(self, places: dict[str, int]) -> None:
+        self._places = places
+        self.next = len(HEAD)
+
+    def block(self, count: int) -> int:
+        """Return the first place of a block of so many numbers."""
+        self.next += count
+        return self.next - count
+
+    def named(self, names: Sequence[str]) -> int:
+        """Return the first place of numbers with names."""
+        first = self.block(len(names))
+        self._places |= {name: first + i for i, name in enumerate(names)}
+        return first
 
 
-def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
-    """Print rig.c.
+def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
+    """Print rig.c: the places of all numbers, the recorded functions, and the rig's tables.
 
     Args:
         rig: The rig.
-        names: Name of the export of each axis' controller.
+        recorded: Its functions.
         build: Fingerprint of the code.
 
     Returns:
         The text.
     """
-    clock, first = clock_of(rig), rig.axes[0].controller
-    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
-    axes = "".join(
-        f"static const axis_type axis_{i} = {{\n{_fields(describe_axis(rig.axes[i], clock))}"
-        f"    .controller = &{name}_controller_type,\n}};\n\n"
-        for i, name in enumerate(names)
-    )
-    turning = ""
-    if rig.turning is not None:
-        coupling, gyro = rig.turning
-        matrices = coupling._asdict()
-        calibrated = replace(gyro, reading="calibrated")
-        described = {"gyro": describe_mems_gyro(calibrated, first.law.dt, NoiseStream.TURN_GYRO), **matrices}
-        turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
-    fields = {
+    axes, controls, places = rig.plant.axes, rig.control.axes, recorded.recorder.places
+    steps = math.gcd(rig.control.period, *(one.sensor.steps_per_sample for one in recorded.all_sensors))
+    layout = Layout(places)
+    fields: Struct = {
         "plugin": rig.plugin,
         "build": build,
         "seed": float(rig.seed),
         "world": float(rig.world),
-        "instant": clock.instant,
-        "period": clock.period // clock.steps,
-        "axes": len(rig.axes),
+        "instant": steps * controls[0].timestep,
+        "period": rig.control.period // steps,
+        "settled": -(-max(axis.settled for axis in controls) // steps),
+        "from": layout.block(len(recorded.inputs)),
     }
-    return f"""/* The rig's numbers. */
+    of_axes: list[Struct] = [
+        {
+            "prefix": axis.prefix,
+            "gimbals": len(axis.modules),
+            "modules": [(one.name, one.direction, one.speed, one.gimbal_zero) for one in axis.modules],
+            "rate_limit": control.law.rate_limit,
+            "raw_rate": control.sensors.accelerometer.raw_rate_hz,
+            "settings_at_first": recorded.settings[i],
+            "servos": layout.block(len(axis.modules)),
+            "motors": layout.block(len(axis.modules)),
+            "shows": layout.block(len(QUANTITIES)),
+            "settings": layout.named([f"setting {i} {k}" for k in range(SETTINGS)]),
+        }
+        for i, (axis, control) in enumerate(zip(axes, controls, strict=True))
+    ]
+    fields["held"] = layout.block(len(axes))
+    fields["rate"] = layout.named([f"rate {i}" for i in range(len(axes))])
+    fields["taken"] = layout.named(recorded.inputs)
+    of_sensors = [_describe_sensor(one, steps, layout, recorded.memory[one.name]) for one in recorded.all_sensors]
+    fields["shown"] = layout.next
+    for i, struct in enumerate(of_axes):
+        estimates = 3 + len(controls[i].extra_signals[0])
+        struct["shown"] = layout.named([f"shown {i} {k}" for k in range(SHOWN + estimates)])
+        struct["estimates"] = estimates
+    fields["memory"] = layout.named(recorded.memory["rig"])
+    streams = sorted({stream for function in recorded.functions for stream in function.streams})
+    fields["noise"] = layout.next
+    generators = [f"{generator(stream)} = {layout.block(NOISE_WORDS)}" for stream in streams]
+    fields["size"] = layout.next
+    rows = {
+        "axis": ("axis_type", list(map(_value, of_axes))),
+        "sensor": ("sensor_type", list(map(_value, of_sensors))),
+        "input": ("input_type", [_value(_input(rig, name)) for name in recorded.inputs]),
+        "stream": ("int", [str(stream) for stream in streams]),
+    }
+    tables = "".join(
+        f"static const {kind} {name}_table[] = {{\n{''.join(f'    {one},{chr(10)}' for one in values or ['0'])}}};\n\n"
+        for name, (kind, values) in rows.items()
+    )
+    counted = {"axes": "axis", "sensors": "sensor", "inputs": "input", "streams": "stream"}
+    fields |= {count: len(rows[name][1]) for count, name in counted.items()}
+    names = {name: f"{name}_table" for name in rows}
+    names |= {name: getattr(recorded, name).name for name in ("first", "trimmed", "later")}
+    linked = "".join(f"    .{name} = {value},\n" for name, value in names.items())
+    places_of_noise = f"enum {{ {', '.join(generators)} }};\n\n" if generators else ""
+    functions = "".join(map(recorded.recorder.printed, recorded.functions))
+    return f"""/* The rig: what was recorded of its sensors and decisions, as functions of the state, and its numbers. */
 #include "rig.h"
 
-{declarations}
-{axes}{turning}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+#include "noise.h"
 
-const rig_type rig = {{
-{_fields(fields)}    .axis = axes,
-    .turning = {"&turning" if turning else "0"},
-}};
+#include <math.h>
+
+{places_of_noise}{functions}{tables}const rig_type rig = {{
+{_fields(fields)}{linked}}};
 """
+
+
+def _describe_sensor(one: RecordedSensor, steps: int, layout: Layout, memory: Sequence[str]) -> Struct:
+    """Describe a sensor: `sensor_type` in C, its times in instants of so many physics steps."""
+    sensor, channels = one.sensor, len(one.ideal.results)
+    layout.named(memory)
+    delivered = layout.named(delivered_names(one))
+    on_the_way = layout.block(sensor.kept * one.width) if sensor.latency else delivered
+    return {
+        "channels": channels,
+        "width": one.width,
+        "period": sensor.period // steps,
+        "raw": sensor.raw // steps,
+        "skew": sensor.skew // steps,
+        "latency": -(-sensor.latency // steps),
+        "settling": sensor.settle,
+        "kept": sensor.kept,
+        "older_kept": sensor.older_kept,
+        "delivered": delivered,
+        "readings": on_the_way,
+        "older": layout.block(sensor.older_kept * channels),
+        "ideal": Name(one.ideal.name),
+        "init": Name(one.init.name),
+        "take": Name(one.take.name),
+    }
+
+
+def _input(rig: PluginRig, name: str) -> Struct:
+    """Describe a number that MuJoCo gives: `input_type` in C."""
+    model, (row, number) = rig.plant.model, name.split()
+    place = int(number)
+    if row == "qvel":
+        joint = int(model.dof_jntid[place])
+        first, kind = int(model.jnt_dofadr[joint]), int(model.jnt_type[joint])
+        return {"name": model.joint(joint).name, "is_rate": 1, "kind": kind, "offset": place - first}
+    sensor = int(np.searchsorted(model.sensor_adr, place, side="right")) - 1
+    offset, kind = place - int(model.sensor_adr[sensor]), int(model.sensor_type[sensor])
+    return {"name": model.sensor(sensor).name, "is_rate": 0, "kind": kind, "offset": offset}
 
 
 def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
@@ -339,6 +371,8 @@ def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
 
 def _value(value: Value, indent: str = "") -> str:
     """Print a number, a text, a struct, or a row of numbers; every number as C reads it exactly."""
+    if isinstance(value, Name):
+        return value
     if isinstance(value, str):
         return c_text(value)
     if isinstance(value, int):
