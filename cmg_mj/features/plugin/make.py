@@ -139,7 +139,8 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     for i, part in enumerate(experiment.axes):
         for section, settings in part.scenario.feature_sections.items():
             words = next((one.unmodelled for one in settings if one.unmodelled), "")
-            if words and not FEATURES[section].edit:
+            feature = FEATURES[section]
+            if words and (feature.disturbance or feature.between):
                 raise InputError(f"{section}: {words}: a plugin does not have it")
         control = part.design.axis_control(part.plant.interface, axis=i, open_loop_observers=())
         require_traceable(control)

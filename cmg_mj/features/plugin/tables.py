@@ -314,7 +314,7 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
     linked = "".join(f"    .{name} = {value},\n" for name, value in names.items())
     places_of_noise = f"enum {{ {', '.join(generators)} }};\n\n" if generators else ""
     functions = "".join(map(recorded.recorder.printed, recorded.functions))
-    return f"""/* The rig: what was recorded of its sensors and decisions, as functions of the state, and its numbers. */
+    return f"""/* The rig: its sensors and decisions, recorded as functions of the state, and its numbers. */
 #include "rig.h"
 
 #include "noise.h"

@@ -140,7 +140,7 @@ void noise_normals(double generator[NOISE_WORDS], double *normals, int n)
 }
 
 double noise_mean(
-    double generator[NOISE_WORDS], int width, void (*next)(double *memory, const double *normals, double *result),
+    double generator[NOISE_WORDS], int width, void (*step)(double *memory, const double *normals, double *result),
     double *memory, int samples, int piece)
 {
     double normals[NOISE_WIDTH], result, mean = 0.0;
@@ -148,7 +148,7 @@ double noise_mean(
         double sum = 0.0;
         for (int i = 0; i < piece && from + i < samples; ++i) {
             noise_normals(generator, normals, width);
-            next(memory, normals, &result);
+            step(memory, normals, &result);
             sum = i ? sum + result : result;
         }
         mean = mean + sum / samples;

@@ -14,7 +14,7 @@ void noise_normals(double generator[NOISE_WORDS], double *normals, int n);
 
 /* Advance a memory by so many samples of so many normals; the mean of what they give, which is summed in pieces. */
 double noise_mean(
-    double generator[NOISE_WORDS], int width, void (*next)(double *memory, const double *normals, double *result),
+    double generator[NOISE_WORDS], int width, void (*step)(double *memory, const double *normals, double *result),
     double *memory, int samples, int piece);
 
 #endif
