@@ -341,7 +341,7 @@ class AxisControl:
                 name = type(self.law).__name__
                 raise RunStopped(f"law {name} returned {command} for u at t = {time:g} s")
             return after, clip(float(command), -limit, limit)
-        if isinstance(command, Symbolic):
+        if isinstance(y[0], Symbolic):
             return after, where(abs(command) < math.inf, clip(command, -limit, limit), command)
         return after, np.where(np.isfinite(command), clip(command, -limit, limit), command)  # judged elsewhere
 

@@ -16,7 +16,7 @@ from cmg_mj.core.errors import InputError, raised, shown
 from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision
-from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
+from cmg_mj.features.export.c_files import CodePrinter, format_example, format_test_vector
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.constants import Constants, class_path, constants_of
 from cmg_mj.features.export.names import name_of
@@ -32,19 +32,17 @@ class Code(NamedTuple):
     Attributes:
         files: Name -> text.
         figures: Its sizes and differences from Python, as `--json` prints them.
-        law: The printer of the law's part, for C that is joined to it.
     """
 
     files: dict[str, str]
     figures: dict[str, Any]
-    law: LawPrinter
 
 
-def generate_code(controller: AxisControl, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
-    """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
+def generate_code(controller: AxisControl, precision: Precision, name: str | None = None) -> Code:
+    """Generate a controller's C and compare it with Python; see `export`."""
     require_exportable(controller)
     with _named(controller):
-        return _generate(controller, precision, name_of(controller.observer, name) + suffix)
+        return _generate(controller, precision, name_of(controller.observer, name))
 
 
 def require_traceable(controller: AxisControl) -> None:
@@ -139,7 +137,7 @@ def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
             off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(controller, expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
-    return Code(files, figures, printer.law)
+    return Code(files, figures)
 
 
 def export_table(figures: Mapping[str, Any]) -> str:

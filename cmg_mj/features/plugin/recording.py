@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
+
+import mujoco
 
 from cmg_mj.core.arrays import Symbolic
 from cmg_mj.core.axis import AxisControl
@@ -18,249 +19,123 @@ from cmg_mj.core.tape import INPUT, Operand, Symbol, Tape
 from cmg_mj.core.tree import FLOATS, form, numbers, rebuild
 from cmg_mj.features.export.c_code import body
 from cmg_mj.features.export.formula import Formula
+from cmg_mj.plant.elements import joint_sizes
 from cmg_mj.plant.plant import Plant
 from cmg_mj.stages.pair import White
 
 OF_STAGES = (Symbolic, *FLOATS)
 """Numbers of a stage's memory; its whole numbers count samples, by which it looks up noise."""
-SETTINGS = 3
-"""Numbers of an axis that a model's <config> may change: sigma and step of the forces, step of the angles."""
+CONFIGURED = (0, White, "sigma"), (0, Digital, "resolution"), (1, Digital, "resolution")
+"""Numbers of an axis that a model's <config> may change: the sensor, its stage, the stage's field."""
 
-Results = list[tuple[str, Operand]]
-"""What a function writes: name of a number, or its text in C -> number."""
-
-
-@dataclass
-class Function:
-    """A function in C.
-
-    Attributes:
-        name: Its name.
-        arguments: Its arguments, after the state's numbers `s`.
-        steps: What comes before its results: lines, and numbers that are written to a row of its own.
-        results: What it writes.
-        streams: Number of each noise stream that it draws from.
-        helpers: Functions that it calls.
-    """
-
-    name: str
-    arguments: tuple[str, ...] = ()
-    steps: list[str | Results] = field(default_factory=list)
-    results: Results = field(default_factory=list)
-    streams: set[int] = field(default_factory=set)
-    helpers: list[Function] = field(default_factory=list)
-
-
-IDEAL = ("double *x",)
-SAMPLE = ("const double *x", "double *y")
-REPEATED = ("const double *n", "double *result")
-
-
-class RecordedSensor(NamedTuple):
-    """A sensor as functions in C."""
-
-    name: str
-    sensor: Sensor
-    ideal: Function
-    """Its signal, of the inputs."""
-    init: Function
-    take: Function
-    width: int
-    """Numbers of a reading."""
-
-
-class Stream:
-    """A noise stream while functions are recorded: its samples come one after the other, as a generator's."""
-
-    def __init__(self, recorder: Recorder, number: int, width: int) -> None:
-        self._recorder, self._number, self._width = recorder, number, width
-        self._next = 0
-        self._function: Function | None = None
-        self._looked: dict[int, Sequence[Symbol]] = {}
-
-    def __call__(self, sample: int) -> Sequence[Symbol]:
-        """Return the normals of a sample.
-
-        Raises:
-            InputError: It is not the next one.
-        """
-        function = self._recorder.function
-        if function is not self._function:
-            self._function, self._looked = function, {}
-        if sample not in self._looked:
-            self._draw(sample)
-            row = f"d{len(function.steps)}"
-            function.steps.append(f"double {row}[{self._width}];")
-            function.steps.append(f"noise_normals(s + {generator(self._number)}, {row}, {self._width});")
-            self._looked[sample] = self._recorder.inputs(f"{row}[{{}}]", self._width)
-        return self._looked[sample]
-
-    def mean(
-        self,
-        formula: Callable[..., tuple[Sequence[Symbol], Symbol]],
-        memory: Sequence[Operand],
-        samples: int,
-        piece: int,
-    ) -> tuple[list[Symbol], Symbol]:
-        """Record a loop over the next samples.
-
-        Args:
-            formula: Takes a memory and the normals of a sample; returns the next memory, and a result.
-            memory: The memory before the loop.
-            samples: Number of the samples.
-            piece: Number of those whose results are summed together.
-
-        Returns:
-            The memory behind the loop, and the mean of the results.
-        """
-        recorder, function = self._recorder, self._recorder.function
-        next_one = Function(f"{function.name}_{len(function.steps)}", REPEATED)
-        after, result = formula(recorder.inputs("s[{}]", len(memory)), recorder.inputs("n[{}]", self._width))
-        next_one.results = [*zip(_row("s", len(memory)), after, strict=True), ("*result", result)]
-        function.helpers.append(next_one)
-        row, mean = f"r{len(function.steps)}", f"m{len(function.steps)}"
-        function.steps.append(f"double {row}[{len(memory)}];")
-        function.steps.append(list(zip(_row(row, len(memory)), memory, strict=True)))
-        words = f"{generator(self._number)}, {self._width}, {next_one.name}, {row}, {samples}, {piece}"
-        function.steps.append(f"const double {mean} = noise_mean(s + {words});")
-        self._draw(self._next)
-        self._next += samples - 1
-        return recorder.inputs(f"{row}[{{}}]", len(memory)), recorder.tape.input(mean)
-
-    def _draw(self, sample: int) -> None:
-        if sample != self._next:
-            raise InputError(
-                f"noise stream {self._number}: sample {sample} is looked up, and {self._next} is next: a plugin draws "
-                "one after the other"
-            )
-        self._next += 1
-        self._recorder.function.streams.add(self._number)
-
-
-def generator(stream: int) -> str:
-    """Name the place of a stream's generator in the state."""
-    return f"NOISE_{stream}"
-
-
-def _row(name: str, count: int) -> list[str]:
-    return [f"{name}[{i}]" for i in range(count)]
+Row = list[tuple[str, Operand]]
+"""Numbers that are written at once: name of a number in the state, or its text in C -> number."""
 
 
 class Recorder:
-    """Records functions.
+    """Records functions in C of a state's numbers `s`, of a signal `x`, to a signal `y`.
 
     Attributes:
         tape: Their operations.
-        function: The function that is being recorded.
+        functions: Name -> lines, and rows of numbers that it writes. What a name has before its first `_` it has in
+            common with those of the same part.
         places: Name of a number -> its place in the state.
     """
 
     def __init__(self) -> None:
         self.tape = Tape()
-        self.function = Function("")
+        self.functions: dict[str, list[str | Row]] = {}
         self.places: dict[str, int] = {}
 
+    def begin(self, name: str) -> None:
+        """Begin a function."""
+        self.name = name
+        self.steps = self.functions[name] = []
+
     def inputs(self, name: str, count: int) -> list[Symbol]:
-        """Append numbers that are given, `{}` in their name stands for their index."""
+        """Append numbers that are given; `{}` in their name stands for their index."""
         return [self.tape.input(name.format(i)) for i in range(count)]
 
-    @contextmanager
-    def recording(self, name: str, *arguments: str) -> Iterator[Function]:
-        """Record a function of this name and these arguments."""
-        self.function = Function(name, arguments)
-        yield self.function
-
-    def repeated(
-        self,
-        name: str,
-        arguments: Sequence[str],
-        tree: Any,
-        runs: Sequence[Callable[[Any], tuple[Any, Results]]],
-    ) -> tuple[Function, Any]:
-        """Record a function with a memory, each time with the memory that the time before has left.
+    def repeated(self, name: str, tree: Any, runs: Sequence[Callable[[Any], tuple[Any, Row]]]) -> Any:
+        """Record a function with a memory several times, each time with the memory that the time before has left.
 
         Args:
-            name: The function's name; before its first `_` stands what the memory's numbers are named with.
-            arguments: Its arguments.
+            name: The function's name.
             tree: The memory before.
-            runs: What it does, (memory) -> (next memory, results), in several calls.
+            runs: What it does at each time: (memory) -> (next memory, results).
 
         Returns:
-            The function, and the memory behind the last call.
+            The memory behind.
 
         Raises:
-            InputError: The calls differ, or the memory's form does.
+            InputError: The times differ, or the memory's form does.
         """
         recorded = []
         for run in runs:
-            with self.recording(name, *arguments) as function:
-                names = self.names_of(name, tree)
-                after, results = run(_rebuilt(tree, iter([self.tape.input(one) for one in names])))
-                function.results = [*zip(names, _leaves(after), strict=True), *results]
+            self.begin(name)
+            before = [self.tape.input(one) for one, _ in self.remembered(tree)]
+            after, results = run(_rebuilt(tree, iter(before)))
             if form(after) != form(tree):
                 raise InputError(f"{name}: its memory changes its form")
+            results = [*self.remembered(after), *results]
+            recorded.append((list(self.steps), [(target, self.tape.place(number)) for target, number in results]))
+            self.steps.append(results)
             tree = after
-            places = [(target, self.tape.place(number)) for target, number in function.results]
-            recorded.append((places, [step for step in function.steps if isinstance(step, str)]))
         if any(one != recorded[0] for one in recorded):
             raise InputError(f"{name}: depends on the number of the sample or the step otherwise than by its noise")
-        return function, tree
+        return tree
 
-    def names_of(self, name: str, tree: Any) -> list[str]:
-        """Name the numbers of a memory."""
-        return [f"{name.partition('_')[0]} {i}" for i in range(len(_leaves(tree)))]
+    def remembered(self, tree: Any) -> Row:
+        """List the numbers of a memory of the function that is recorded, with their names."""
+        return row(f"{self.name.partition('_')[0]} {{}}", _leaves(tree))
 
-    def used(self, functions: Sequence[Function]) -> set[str]:
-        """Find the names of the numbers that functions take."""
-        written = [row for one in functions for row in (one.results, *one.steps) if not isinstance(row, str)]
-        places = [self.tape.place(number) for row in written for _, number in row]
+    def used(self, parts: Collection[str]) -> set[str]:
+        """Find the names of the numbers that the functions of some parts take."""
+        steps = [step for name in self.functions if _part(name) in parts for step in self.functions[name]]
+        places = [self.tape.place(number) for step in steps if not isinstance(step, str) for _, number in step]
         operations = [self.tape.operations[place] for place in self.tape.needed(places)]
         return {operation.value for operation in operations if operation.name == INPUT}
 
-    def prune(self, memory: Sequence[str], functions: Sequence[Function]) -> list[str]:
-        """Leave out what functions remember and never use; return the names of the rest of a memory."""
-        kept: set[str] = set()
-        while True:
-            thinned = [
-                replace(one, results=[result for result in one.results if result[0] not in memory or result[0] in kept])
-                for one in functions
-            ]
-            found = self.used(thinned).intersection(memory)
-            if found == kept:
-                break
-            kept = found
-        for function, thin in zip(functions, thinned, strict=True):
-            function.results = thin.results
-        return [name for name in memory if name in kept]
+    def locate(self, names: Sequence[str], first: int) -> int:
+        """Give names the next places; the state's first one is given. Return the first of them."""
+        first += len(self.places)
+        self.places |= {name: first + i for i, name in enumerate(names)}
+        return first
 
-    def printed(self, function: Function) -> str:
-        """Print a function in C."""
-        lines = []
-        for step in function.steps:
-            lines += [step] if isinstance(step, str) else ["{", *self._body(step), "}"]
-        lines += self._body(function.results)
-        arguments = ["double *s", *function.arguments]
-        unused = ", ".join(f"(void){argument.split('*')[-1]}" for argument in arguments)
-        helpers = "".join(map(self.printed, function.helpers))
-        text = "".join(f"    {line}\n" for line in [f"{unused};", *lines])
-        return f"{helpers}static void {function.name}({', '.join(arguments)})\n{{\n{text}}}\n\n"
+    def printed(self, parts: Collection[str]) -> str:
+        """Print the functions of some parts in C."""
+        text = ""
+        for name, steps in self.functions.items():
+            if _part(name) in parts:
+                lines = [line for step in steps for line in ([step] if isinstance(step, str) else self._block(step))]
+                inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *lines])
+                text += f"static void {name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
+        return text
 
-    def _body(self, results: Results) -> list[str]:
-        written = [(self._text(target), self.tape.place(number)) for target, number in results]
+    def _block(self, written: Row) -> list[str]:
+        places = [self.tape.place(number) for _, number in written]
         operations = self.tape.operations
-        written = [
-            (target, place)
-            for target, place in written
-            if operations[place].name != INPUT or self._text(operations[place].value) != target
-        ]
-        needed = sorted(self.tape.needed(place for _, place in written))
-        given = [place for place in needed if operations[place].name == INPUT]
+        given = [place for place in sorted(self.tape.needed(places)) if operations[place].name == INPUT]
         names = [self._text(operations[place].value) for place in given]
-        formula = Formula(self.tape, given, [place for _, place in written])
-        return body(formula, names, [target for target, _ in written], "double", "double")
+        targets = [self._text(name) for name, _ in written]
+        return ["{", *body(Formula(self.tape, given, places), names, targets, "double", "double"), "}"]
 
     def _text(self, name: str) -> str:
         return f"s[{self.places[name]}]" if name in self.places else name
+
+
+def row(name: str, values: Sequence[Operand]) -> Row:
+    """Name numbers; `{}` in the name stands for their index."""
+    return [(name.format(i), value) for i, value in enumerate(values)]
+
+
+def generator(stream: int) -> str:
+    """Name the place of a noise stream's generator in the state."""
+    return f"NOISE_{stream}"
+
+
+def _part(name: str) -> str:
+    return name.partition("_")[0]
 
 
 def _leaves(tree: Any) -> list[Any]:
@@ -276,34 +151,100 @@ def _rebuilt(tree: Any, values: Iterator[Any]) -> Any:
     return rebuild(tree, values, OF_STAGES)
 
 
+class Stream:
+    """A noise stream while functions are recorded: its samples come one after the other, as a generator's."""
+
+    def __init__(self, recorder: Recorder, number: int, width: int) -> None:
+        self._recorder, self._number, self._width = recorder, number, width
+        self._next = 0
+        self._steps: list[str | Row] = []
+        self._drawn: Sequence[Symbol] = ()
+
+    def __call__(self, sample: int) -> Sequence[Symbol]:
+        """Return the normals of a sample.
+
+        Raises:
+            InputError: It is neither the next one nor the last one of the same function.
+        """
+        steps = self._recorder.steps
+        if sample == self._next:
+            drawn = f"d{len(steps)}"
+            steps.append(f"double {drawn}[{self._width}];")
+            steps.append(f"noise_normals(s + {generator(self._number)}, {drawn}, {self._width});")
+            self._drawn = self._recorder.inputs(f"{drawn}[{{}}]", self._width)
+            self._steps = steps
+            self._next += 1
+        elif sample != self._next - 1 or steps is not self._steps:
+            raise InputError(
+                f"noise stream {self._number}: sample {sample} is looked up, and {self._next} is next: a plugin draws "
+                "one after the other"
+            )
+        return self._drawn
+
+    def mean(
+        self,
+        formula: Callable[..., tuple[Sequence[Operand], Operand]],
+        memory: Sequence[Operand],
+        samples: int,
+        piece: int,
+    ) -> tuple[Sequence[Operand], Operand]:
+        """Record a loop over the next samples.
+
+        Args:
+            formula: Takes a memory and the normals of a sample; returns the next memory, and a result.
+            memory: The memory before the loop.
+            samples: Number of the samples.
+            piece: Number of those whose results are summed together.
+
+        Returns:
+            The memory behind the loop, and the mean of the results.
+        """
+        recorder, name, steps, count = self._recorder, self._recorder.name, self._recorder.steps, len(memory)
+        number = len(steps)
+        steps.append(f"double r{number}[{count}];")
+        steps.append(row(f"r{number}[{{}}]", memory))
+        del recorder.functions[name]  # it comes behind the one that it calls
+        recorder.begin(f"{name}_{number}")
+        after, result = formula(recorder.inputs("s[{}]", count), recorder.inputs("x[{}]", self._width))
+        recorder.steps.append([*row("s[{}]", after), ("y[0]", result)])
+        words = f"{generator(self._number)}, {self._width}, {recorder.name}, r{number}, {samples}, {piece}"
+        steps.append(f"const double m{number} = noise_mean(s + {words});")
+        recorder.name, recorder.steps = name, steps
+        recorder.functions[name] = steps
+        self._next += samples
+        return recorder.inputs(f"r{number}[{{}}]", count), recorder.tape.input(f"m{number}")
+
+
+class RecordedSensor(NamedTuple):
+    """A sensor whose functions have been recorded: NAME_ideal, NAME_init and NAME_take."""
+
+    name: str
+    sensor: Sensor
+    channels: int
+    """Numbers of its signal."""
+    memory: list[str]
+    """Names of what it remembers."""
+    delivered: list[str]
+    """Names of its reading, as the decisions take it."""
+
+
 class RecordedRig(NamedTuple):
-    """A rig as functions in C."""
+    """A rig whose functions have been recorded."""
 
     recorder: Recorder
-    control: RigControl
-    sensors: list[list[RecordedSensor]]
-    """Those of each axis that the decisions depend on."""
+    sensors: list[RecordedSensor]
+    """Those that the decisions depend on."""
     settings: list[list[float]]
     """The numbers of each axis that a model's <config> may change."""
-    first: Function
-    trimmed: Function
-    later: Function
-    memory: dict[str, list[str]]
-    """Names of what each sensor remembers, and under `rig` of what the decisions do."""
+    memory: list[str]
+    """Names of what the decisions remember."""
     inputs: list[str]
-    """Names of the numbers that MuJoCo gives: `sensordata` or `qvel`, then a place there."""
+    """Names of the numbers that MuJoCo gives: see `given_by`."""
 
     @property
-    def all_sensors(self) -> list[RecordedSensor]:
-        """The sensors of all axes."""
-        return [sensor for of_axis in self.sensors for sensor in of_axis]
-
-    @property
-    def functions(self) -> list[Function]:
-        """All functions."""
-        of_sensors = [part for one in self.all_sensors for part in (one.ideal, one.init, one.take)]
-        decisions = [self.first, self.trimmed, self.later]
-        return [*of_sensors, *decisions[: 1 if self.trimmed is self.later else 2], self.later]
+    def parts(self) -> list[str]:
+        """Names of the parts that are in use."""
+        return ["rig", *(one.name for one in self.sensors)]
 
 
 def record(control: RigControl, plant: Plant) -> RecordedRig:
@@ -311,7 +252,7 @@ def record(control: RigControl, plant: Plant) -> RecordedRig:
 
     Args:
         control: The control, whose observers and laws can be traced.
-        plant: The plant, whose sensors give the readings.
+        plant: The plant.
 
     Returns:
         The functions.
@@ -319,101 +260,82 @@ def record(control: RigControl, plant: Plant) -> RecordedRig:
     Raises:
         InputError: Plain C cannot do what one of the stages does.
     """
-    require_recordable(control)
-    recorder = Recorder()
-    model = plant.model
-    readings = plant.ideal_readings(
-        recorder.inputs("sensordata {}", model.nsensordata), recorder.inputs("qvel {}", model.nv)
-    )
-    streams = {number: Stream(recorder, number, width) for number, width in control.draws.items()}
-    settings = [_settings(axis) for axis in control.axes]
-    axes = [_with_settings(axis, recorder.inputs(f"setting {i} {{}}", SETTINGS)) for i, axis in enumerate(control.axes)]
-    control = replace(control, axes=tuple(axes))
-    sensors = [
-        [_sensor(recorder, f"a{i}s{k}", sensor, ideal, streams) for k, sensor in enumerate(axis.at_work)]
-        for i, (axis, ideal) in enumerate(zip(axes, ideals_of(readings), strict=True))
-    ]
-    first, trimmed, later, names = _decisions(recorder, control, sensors, readings, streams)
-    memory = {"rig": recorder.prune(names, [later, trimmed, first])}
-    delivered = recorder.used([first, trimmed, later])
-    needed = [[one for one in of_axis if delivered.intersection(delivered_names(one))] for of_axis in sensors]
-    for one in (one for of_axis in needed for one in of_axis):
-        init_names = [target for target, _ in one.init.results if target.startswith(f"{one.name} ")]
-        memory[one.name] = recorder.prune(init_names, [one.take, one.init])
-    made = RecordedRig(recorder, control, needed, settings, first, trimmed, later, memory, [])
-    used = recorder.used(made.functions)
-    given = [f"sensordata {i}" for i in range(model.nsensordata)] + [f"qvel {i}" for i in range(model.nv)]
-    return made._replace(inputs=[name for name in given if name in used])
-
-
-def require_recordable(control: RigControl) -> None:
-    """Refuse what depends on more than the tick before.
-
-    Raises:
-        InputError: A stage moves other actuators or looks up a plan, or two sensors share their noise.
-    """
     for stage in control.between:
         if stage.actuators or stage.tables:
             raise InputError(f"{type(stage).__name__}: moves actuators or follows a plan: a plugin does not have it")
-    sensors = [sensor.draws for axis in control.axes for sensor in axis.at_work]
-    if sum(map(len, (*sensors, *(stage.draws for stage in control.between)))) > len(control.draws):
+    parts = [*(sensor for axis in control.axes for sensor in axis.at_work), *control.between]
+    if sum(len(part.draws) for part in parts) > len(control.draws):
         raise InputError("two sensors share a noise stream: a plugin draws each stream for one")
-
-
-def _settings(axis: AxisControl) -> list[float]:
-    accelerometer, encoder, *_ = axis.at_work
-    (sigma,) = (stage.sigma for stage in accelerometer.stages if isinstance(stage, White))
-    steps = [
-        stage.resolution for part in (accelerometer, encoder) for stage in part.stages if isinstance(stage, Digital)
+    recorder = Recorder()
+    given = given_by(plant.model)
+    ideal = plant.ideal_readings(*([recorder.tape.input(name) for name in names] for names in given))
+    streams = {number: Stream(recorder, number, width) for number, width in control.draws.items()}
+    pairs = [
+        _configured(axis, recorder.inputs(f"setting {i} {{}}", len(CONFIGURED))) for i, axis in enumerate(control.axes)
     ]
-    return [sigma, *steps]
+    control = replace(control, axes=tuple(axis for axis, _ in pairs))
+    sensors = [
+        [_sensor(recorder, f"a{i}s{k}", sensor, own, streams) for k, sensor in enumerate(axis.at_work)]
+        for i, (axis, own) in enumerate(zip(control.axes, ideals_of(ideal), strict=True))
+    ]
+    memory = _decisions(recorder, control, sensors, ideal, streams)
+    taken = recorder.used(["rig"])
+    needed = [one for of_axis in sensors for one in of_axis if taken.intersection(one.delivered)]
+    names = recorder.used(["rig", *(one.name for one in needed)])
+    inputs = [name for row in given for name in row if name in names]
+    return RecordedRig(recorder, needed, [values for _, values in pairs], memory, inputs)
 
 
-def _with_settings(axis: AxisControl, settings: Sequence[Any]) -> AxisControl:
-    """Return an axis whose settings are symbols, with an observer and a law that may remember symbols."""
-    sigma, force_step, angle_step = settings
-    accelerometer, encoder, *others = axis.at_work
-    at_work = [_set(accelerometer, sigma, force_step), _set(encoder, sigma, angle_step), *others]
+def given_by(model: mujoco.MjModel) -> tuple[list[str], list[str]]:
+    """Name the numbers in sensordata and in qvel, each as an `input_type` in C."""
+    sensors, joints = (model.sensor(i) for i in range(model.nsensor)), (model.joint(i) for i in range(model.njnt))
+    return (
+        [f"{{{c_text(one.name)}, 0, {one.type[0]}, {k}}}" for one in sensors for k in range(one.dim[0])],
+        [
+            f"{{{c_text(one.name)}, 1, {one.type[0]}, {k}}}"
+            for one in joints
+            for k in range(joint_sizes(one.type[0])[1])
+        ],
+    )
+
+
+def c_text(text: str) -> str:
+    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
+    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
+    return f'"{"".join(letters)}"'
+
+
+def _configured(axis: AxisControl, symbols: Sequence[Symbol]) -> tuple[AxisControl, list[float]]:
+    """Return an axis with symbols as its settings, whose observer and law may remember symbols; and the settings."""
+    at_work, values = list(axis.at_work), []
+    for symbol, (part, kind, name) in zip(symbols, CONFIGURED, strict=True):
+        stages = list(at_work[part].stages)
+        (place,) = (i for i, stage in enumerate(stages) if type(stage) is kind)
+        values.append(getattr(stages[place], name))
+        stages[place] = replace(stages[place], **{name: symbol})
+        at_work[part] = replace(at_work[part], stages=tuple(stages))
     observers, law = copy.deepcopy((axis.observers, axis.law))
-    return replace(axis, observers=observers, law=law, at_work=tuple(at_work))
-
-
-def _set(sensor: Sensor, sigma: Any, step: Any) -> Sensor:
-    stages = [
-        replace(stage, sigma=sigma)
-        if isinstance(stage, White)
-        else replace(stage, resolution=step)
-        if isinstance(stage, Digital)
-        else stage
-        for stage in sensor.stages
-    ]
-    return replace(sensor, stages=tuple(stages))
-
-
-def delivered_names(one: RecordedSensor) -> list[str]:
-    """Name the numbers of a sensor that the decisions take."""
-    return [f"delivered {one.name} {i}" for i in range(one.width)]
+    return replace(axis, observers=observers, law=law, at_work=tuple(at_work)), values
 
 
 def _sensor(recorder: Recorder, name: str, sensor: Sensor, ideal: Any, streams: Mapping[int, Stream]) -> RecordedSensor:
     """Record a sensor: its signal, its first sample, and a sample after others."""
     signal = sensor.ideal(ideal)
+    recorder.begin(f"{name}_ideal")
+    recorder.steps.append(row("y[{}]", signal))
     x = recorder.inputs("x[{}]", len(signal))
-    with recorder.recording(f"{name}_ideal", *IDEAL) as shown:
-        shown.results = list(zip(_row("x", len(signal)), signal, strict=True))
-    with recorder.recording(f"{name}_init", *SAMPLE) as init:
-        memory, reading = sensor.started(x, ideal, streams)
-        rows = _row("y", len(reading))
-        names = recorder.names_of(name, memory)
-        init.results = [*zip(names, _leaves(memory), strict=True), *zip(rows, reading, strict=True)]
+    recorder.begin(f"{name}_init")
+    memory, reading = sensor.started(x, ideal, streams)
+    remembered = recorder.remembered(memory)
+    recorder.steps.append([*remembered, *row("y[{}]", reading)])
 
-    def taken(sample: int, before: Any) -> tuple[Any, Results]:
+    def taken(before: Any, sample: int) -> tuple[Any, Row]:
         after, reading = sensor.passed(before, x, ideal, sample, streams)
-        return after, list(zip(rows, reading, strict=True))
+        return after, row("y[{}]", reading)
 
-    runs = [lambda before, sample=sample: taken(sample, before) for sample in (1, 2)]
-    take, _ = recorder.repeated(f"{name}_take", SAMPLE, memory, runs)
-    return RecordedSensor(name, sensor, shown, init, take, len(reading))
+    recorder.repeated(f"{name}_take", memory, [lambda before, n=n: taken(before, n) for n in (1, 2)])
+    delivered = [f"delivered {name} {i}" for i in range(len(reading))]
+    return RecordedSensor(name, sensor, len(signal), [one for one, _ in remembered], delivered)
 
 
 def _decisions(
@@ -422,42 +344,35 @@ def _decisions(
     sensors: Sequence[Sequence[RecordedSensor]],
     readings: Readings,
     streams: Mapping[int, Stream],
-) -> tuple[Function, Function, Function, list[str]]:
-    """Record the first decision, those while a memory is trimmed, and the later ones; and name what they remember."""
-    sampled = []
-    for of_axis in sensors:
-        rows = [[recorder.tape.input(name) for name in delivered_names(one)] for one in of_axis]
-        states = [SensorState(1, (), (row,) * one.sensor.kept) for one, row in zip(of_axis, rows, strict=True)]
-        sampled.append(tuple(states))
+) -> list[str]:
+    """Record the first decision, one while a memory is trimmed, and a later one; return names of what they remember."""
 
-    def decided(step: int, before: RigDeciding | None) -> tuple[RigDeciding, Results]:
-        axes, ticks = control.decide(tuple(sampled), before, step, readings)
+    def state(one: RecordedSensor) -> SensorState:
+        return SensorState(1, (), ([recorder.tape.input(name) for name in one.delivered],) * one.sensor.kept)
+
+    sampled = tuple(tuple(map(state, of_axis)) for of_axis in sensors)
+
+    def decided(before: RigDeciding | None, tick: int) -> tuple[RigDeciding, Row]:
+        step = tick * control.period
+        axes, ticks = control.decide(sampled, before, step, readings)
         after, decision = control.drive(axes, before and before.between, step, ticks, readings, streams)
         return after, _shown(decision)
 
-    period = control.period
-    settled = max(1, math.ceil(max(axis.settled for axis in control.axes) / period))
-    with recorder.recording("rig_first") as first:
-        memory, results = decided(0, None)
-        names = recorder.names_of("rig", memory)
-        first.results = [*zip(names, _leaves(memory), strict=True), *results]
-
-    def repeated(name: str, memory: RigDeciding, *ticks: int) -> tuple[Function, RigDeciding]:
-        runs = [lambda before, tick=tick: decided(tick * period, before) for tick in ticks]
-        return recorder.repeated(name, (), memory, runs)
-
-    trimmed = None
-    if settled > 1:
-        trimmed, memory = repeated("rig_trimmed", memory, 1, settled - 1)
-    later, _ = repeated("rig_later", memory, settled, settled + 1)
-    return first, trimmed or later, later, names
+    recorder.begin("rig_first")
+    memory, results = decided(None, 0)
+    remembered = recorder.remembered(memory)
+    recorder.steps.append([*remembered, *results])
+    settled = max(1, math.ceil(max(axis.settled for axis in control.axes) / control.period))
+    for name, ticks in (("rig_trimmed", (1, settled - 1)), ("rig_later", (settled, settled + 1))):
+        if ticks[-1]:
+            memory = recorder.repeated(name, memory, [lambda before, n=n: decided(before, n) for n in ticks])
+    return [name for name, _ in remembered]
 
 
-def _shown(decision: Decision) -> Results:
+def _shown(decision: Decision) -> Row:
     """Name what a decision shows and commands."""
-    results: Results = []
+    results: Row = []
     for i, (tick, rate) in enumerate(zip(decision.ticks, decision.rates, strict=True)):
         shown = [tick.y1, tick.y2, tick.acceleration, tick.u, tick.x_e, *tick.estimates[0]]
-        results += [(f"shown {i} {k}", number) for k, number in enumerate(shown)]
-        results.append((f"rate {i}", rate))
+        results += [*row(f"shown {i} {{}}", shown), (f"rate {i}", rate)]
     return results

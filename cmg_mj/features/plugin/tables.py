@@ -7,25 +7,26 @@ import json
 import math
 import platform
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.rig import RigControl
+from cmg_mj.core.sensor import all_draws
 from cmg_mj.features.export import compiler as c_compiler
 from cmg_mj.features.plugin.driver import check_noise
 from cmg_mj.features.plugin.model import QUANTITIES
 from cmg_mj.features.plugin.recording import (
-    SETTINGS,
+    CONFIGURED,
     RecordedRig,
     RecordedSensor,
-    delivered_names,
+    Recorder,
+    c_text,
     generator,
     record,
 )
@@ -37,23 +38,15 @@ MAX_ESTIMATES = 64
 MAX_CHANNELS = 32
 MAX_WIDTH = 64
 """Sizes of the C's arrays."""
-HEAD = (
-    *("SEED", "WORLD", "STATUS", "STEPS", "PER_INSTANT", "TIMESTEP"),
-    *("IS_PENDING", "STARTS_SPINNING", "IS_SPINNING_UP", "CHECK"),
-)
-"""The state's first numbers, as rig.h names them."""
+HEAD = 10
+"""Numbers at the state's beginning."""
 SHOWN = 5
 """Numbers that are shown of an axis before its estimate."""
 NOISE_WORDS = 8
 """Numbers of a noise stream's generator."""
 
-Value = int | float | str | Sequence["Value"] | Mapping[str, "Value"]
-"""A value in C; a mapping is a struct, by its fields."""
-Struct = dict[str, Value]
-
-
-class Name(str):
-    """A name in C, which is no text."""
+Value = int | float | str | Sequence["Value"]
+"""A value in C; a sequence is a row or a struct."""
 
 
 class PluginRig(NamedTuple):
@@ -160,12 +153,6 @@ def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix
     return result
 
 
-def c_text(text: str) -> str:
-    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
-    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
-    return f'"{"".join(letters)}"'
-
-
 class PluginCode(NamedTuple):
     """A plugin before it is compiled.
 
@@ -213,11 +200,9 @@ def refuse_unsupported(rig: PluginRig, recorded: RecordedRig) -> None:
         InputError: Something is.
     """
     counts = [(len(rig.plant.axes), "axes", MAX_AXES)]
-    for axis, control in zip(rig.plant.axes, rig.control.axes, strict=True):
-        counts.append((len(axis.modules), "modules on an axis", MAX_GIMBALS))
-        counts.append((3 + len(control.extra_signals[0]), "estimates", MAX_ESTIMATES))
-    for one in recorded.all_sensors:
-        counts.append((max(len(one.ideal.results), one.width), "numbers of a sensor", MAX_CHANNELS))
+    counts += [(len(axis.modules), "modules on an axis", MAX_GIMBALS) for axis in rig.plant.axes]
+    counts += [(_estimates(control), "estimates", MAX_ESTIMATES) for control in rig.control.axes]
+    counts += [(max(one.channels, len(one.delivered)), "numbers of a sensor", MAX_CHANNELS) for one in recorded.sensors]
     counts += [(width, "numbers of a noise stream", MAX_WIDTH) for width in rig.control.draws.values()]
     for count, what, most in counts:
         if count > most:
@@ -225,27 +210,8 @@ def refuse_unsupported(rig: PluginRig, recorded: RecordedRig) -> None:
     check_noise(rig.seed, rig.world)
 
 
-class Layout:
-    """Counts places in the state, and remembers those of names."""
-
-    def __init__(self, places: dict[str, int]) -> None:
-        self._places = places
-        self.next = len(HEAD)
-
-    def block(self, count: int) -> int:
-        """Return the first place of a block of so many numbers."""
-        self.next += count
-        return self.next - count
-
-    def named(self, names: Sequence[str]) -> int:
-        """Return the first place of numbers with names."""
-        first = self.block(len(names))
-        self._places |= {name: first + i for i, name in enumerate(names)}
-        return first
-
-
 def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
-    """Print rig.c: the places of all numbers, the recorded functions, and the rig's tables.
+    """Print rig.c: the recorded functions, and the rig's tables.
 
     Args:
         rig: The rig.
@@ -255,65 +221,49 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
     Returns:
         The text.
     """
-    axes, controls, places = rig.plant.axes, rig.control.axes, recorded.recorder.places
-    steps = math.gcd(rig.control.period, *(one.sensor.steps_per_sample for one in recorded.all_sensors))
-    layout = Layout(places)
-    fields: Struct = {
-        "plugin": rig.plugin,
-        "build": build,
-        "seed": float(rig.seed),
-        "world": float(rig.world),
-        "instant": steps * controls[0].timestep,
-        "period": rig.control.period // steps,
-        "settled": -(-max(axis.settled for axis in controls) // steps),
-        "from": layout.block(len(recorded.inputs)),
+    controls, sensors, recorder = rig.control.axes, recorded.sensors, recorded.recorder
+    steps = math.gcd(rig.control.period, *(one.sensor.steps_per_sample for one in sensors))
+    recorder.places.clear()
+
+    def locate(name: str, count: int) -> int:
+        return recorder.locate([f"{name} {i}" for i in range(count)], HEAD)
+
+    inputs = locate("input", len(recorded.inputs))
+    rows = []
+    for i, (axis, control) in enumerate(zip(rig.plant.axes, controls, strict=True)):
+        modules = [(one.name, one.direction, one.speed, one.gimbal_zero) for one in axis.modules]
+        numbers = (control.law.rate_limit, control.sensors.accelerometer.raw_rate_hz, recorded.settings[i])
+        counts = {"servo": len(modules), "motor": len(modules), "show": len(QUANTITIES), "setting": len(CONFIGURED)}
+        places = [locate(f"{name} {i}", count) for name, count in counts.items()]
+        rows.append([axis.prefix, len(modules), _estimates(control), modules, *numbers, *places])
+    held, rate = locate("held", len(controls)), locate("rate", len(controls))
+    taken = recorder.locate(recorded.inputs, HEAD)
+    rows_of_sensors = [_describe_sensor(one, steps, recorder) for one in sensors]
+    shown = [locate(f"shown {i}", SHOWN + _estimates(control)) for i, control in enumerate(controls)]
+    memory = recorder.locate(recorded.memory, HEAD)
+    draws = all_draws([*(one.sensor for one in sensors), *rig.control.between])
+    generators = [locate(generator(stream), NOISE_WORDS) for stream in draws]
+    size = HEAD + len(recorder.places)
+    tables = {
+        "axis_type axes": [_value([*row, place]) for row, place in zip(rows, shown, strict=True)],
+        "sensor_type sensors": rows_of_sensors,
+        "input_type inputs": recorded.inputs,
+        "int streams": list(map(str, draws)),
     }
-    of_axes: list[Struct] = [
-        {
-            "prefix": axis.prefix,
-            "gimbals": len(axis.modules),
-            "modules": [(one.name, one.direction, one.speed, one.gimbal_zero) for one in axis.modules],
-            "rate_limit": control.law.rate_limit,
-            "raw_rate": control.sensors.accelerometer.raw_rate_hz,
-            "settings_at_first": recorded.settings[i],
-            "servos": layout.block(len(axis.modules)),
-            "motors": layout.block(len(axis.modules)),
-            "shows": layout.block(len(QUANTITIES)),
-            "settings": layout.named([f"setting {i} {k}" for k in range(SETTINGS)]),
-        }
-        for i, (axis, control) in enumerate(zip(axes, controls, strict=True))
+    settled = -(-max(axis.settled for axis in controls) // steps)
+    trimmed = "rig_trimmed" if "rig_trimmed" in recorder.functions else "rig_later"
+    numbers = [
+        *(rig.plugin, build, float(rig.seed), float(rig.world), steps * controls[0].timestep),
+        *(rig.control.period // steps, settled, *map(len, tables.values())),
+        *(inputs, held, rate, taken, shown[0], memory, generators[0] if generators else size, size),
     ]
-    fields["held"] = layout.block(len(axes))
-    fields["rate"] = layout.named([f"rate {i}" for i in range(len(axes))])
-    fields["taken"] = layout.named(recorded.inputs)
-    of_sensors = [_describe_sensor(one, steps, layout, recorded.memory[one.name]) for one in recorded.all_sensors]
-    fields["shown"] = layout.next
-    for i, struct in enumerate(of_axes):
-        estimates = 3 + len(controls[i].extra_signals[0])
-        struct["shown"] = layout.named([f"shown {i} {k}" for k in range(SHOWN + estimates)])
-        struct["estimates"] = estimates
-    fields["memory"] = layout.named(recorded.memory["rig"])
-    streams = sorted({stream for function in recorded.functions for stream in function.streams})
-    fields["noise"] = layout.next
-    generators = [f"{generator(stream)} = {layout.block(NOISE_WORDS)}" for stream in streams]
-    fields["size"] = layout.next
-    rows = {
-        "axis": ("axis_type", list(map(_value, of_axes))),
-        "sensor": ("sensor_type", list(map(_value, of_sensors))),
-        "input": ("input_type", [_value(_input(rig, name)) for name in recorded.inputs]),
-        "stream": ("int", [str(stream) for stream in streams]),
-    }
-    tables = "".join(
-        f"static const {kind} {name}_table[] = {{\n{''.join(f'    {one},{chr(10)}' for one in values or ['0'])}}};\n\n"
-        for name, (kind, values) in rows.items()
+    printed = "".join(
+        f"static const {name}[] = {{\n{''.join(f'    {one},{chr(10)}' for one in values or ['0'])}}};\n\n"
+        for name, values in tables.items()
     )
-    counted = {"axes": "axis", "sensors": "sensor", "inputs": "input", "streams": "stream"}
-    fields |= {count: len(rows[name][1]) for count, name in counted.items()}
-    names = {name: f"{name}_table" for name in rows}
-    names |= {name: getattr(recorded, name).name for name in ("first", "trimmed", "later")}
-    linked = "".join(f"    .{name} = {value},\n" for name, value in names.items())
-    places_of_noise = f"enum {{ {', '.join(generators)} }};\n\n" if generators else ""
-    functions = "".join(map(recorded.recorder.printed, recorded.functions))
+    enumerated = "".join(
+        f"enum {{ {generator(stream)} = {place} }};\n" for stream, place in zip(draws, generators, strict=True)
+    )
     return f"""/* The rig: its sensors and decisions, recorded as functions of the state, and its numbers. */
 #include "rig.h"
 
@@ -321,64 +271,41 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
 
 #include <math.h>
 
-{places_of_noise}{functions}{tables}const rig_type rig = {{
-{_fields(fields)}{linked}}};
+{enumerated}
+{recorder.printed(recorded.parts)}{printed}const rig_type rig = {{
+    {", ".join(map(_value, numbers))},
+    axes, sensors, inputs, streams, rig_first, {trimmed}, rig_later
+}};
 """
 
 
-def _describe_sensor(one: RecordedSensor, steps: int, layout: Layout, memory: Sequence[str]) -> Struct:
-    """Describe a sensor: `sensor_type` in C, its times in instants of so many physics steps."""
-    sensor, channels = one.sensor, len(one.ideal.results)
-    layout.named(memory)
-    delivered = layout.named(delivered_names(one))
-    on_the_way = layout.block(sensor.kept * one.width) if sensor.latency else delivered
-    return {
-        "channels": channels,
-        "width": one.width,
-        "period": sensor.period // steps,
-        "raw": sensor.raw // steps,
-        "skew": sensor.skew // steps,
-        "latency": -(-sensor.latency // steps),
-        "settling": sensor.settle,
-        "kept": sensor.kept,
-        "older_kept": sensor.older_kept,
-        "delivered": delivered,
-        "readings": on_the_way,
-        "older": layout.block(sensor.older_kept * channels),
-        "ideal": Name(one.ideal.name),
-        "init": Name(one.init.name),
-        "take": Name(one.take.name),
-    }
+def _estimates(control: AxisControl) -> int:
+    """Count the parts of an estimate."""
+    return 3 + len(control.extra_signals[0])
 
 
-def _input(rig: PluginRig, name: str) -> Struct:
-    """Describe a number that MuJoCo gives: `input_type` in C."""
-    model, (row, number) = rig.plant.model, name.split()
-    place = int(number)
-    if row == "qvel":
-        joint = int(model.dof_jntid[place])
-        first, kind = int(model.jnt_dofadr[joint]), int(model.jnt_type[joint])
-        return {"name": model.joint(joint).name, "is_rate": 1, "kind": kind, "offset": place - first}
-    sensor = int(np.searchsorted(model.sensor_adr, place, side="right")) - 1
-    offset, kind = place - int(model.sensor_adr[sensor]), int(model.sensor_type[sensor])
-    return {"name": model.sensor(sensor).name, "is_rate": 0, "kind": kind, "offset": offset}
+def _describe_sensor(one: RecordedSensor, steps: int, recorder: Recorder) -> str:
+    """Print a `sensor_type`, its times in instants of so many physics steps, and locate its numbers."""
+    sensor, width = one.sensor, len(one.delivered)
+    recorder.locate(one.memory, HEAD)
+    delivered = recorder.locate(one.delivered, HEAD)
+    on_the_way = [f"reading {one.name} {i}" for i in range(sensor.kept * width if sensor.latency else 0)]
+    older = [f"older {one.name} {i}" for i in range(sensor.older_kept * one.channels)]
+    numbers = [
+        *(one.channels, width, sensor.period // steps, sensor.raw // steps, sensor.skew // steps),
+        *(-(-sensor.latency // steps), sensor.settle, sensor.kept, sensor.older_kept),
+        *(recorder.locate(on_the_way, HEAD) if on_the_way else delivered, recorder.locate(older, HEAD), delivered),
+    ]
+    functions = [f"{one.name}_{part}" for part in ("ideal", "init", "take")]
+    return f"{{{', '.join(map(str, [*numbers, *functions]))}}}"
 
 
-def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
-    """Print the fields of a struct, a line each."""
-    return "".join(f"{indent}.{name} = {_value(value, indent)},\n" for name, value in struct.items())
-
-
-def _value(value: Value, indent: str = "") -> str:
-    """Print a number, a text, a struct, or a row of numbers; every number as C reads it exactly."""
-    if isinstance(value, Name):
-        return value
+def _value(value: Value) -> str:
+    """Print a number, a text, or a row or struct of them; every number as C reads it exactly."""
     if isinstance(value, str):
         return c_text(value)
     if isinstance(value, int):
         return str(int(value))
     if isinstance(value, float):
         return repr(float(value))
-    if isinstance(value, Mapping):
-        return f"{{\n{_fields(value, indent + '    ')}{indent}}}"
-    return f"{{{', '.join(_value(part) for part in value)}}}"
+    return f"{{{', '.join(map(_value, value))}}}"

@@ -12,7 +12,7 @@ from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.sensor import SensorStage
 from cmg_mj.features.plugin.make import make_plugin
 from cmg_mj.scenario.design import Design
-from tests.features.plugin.made import SHORT, check_against_runner, make, needs_compiler
+from tests.features.plugin.made import EFFECTS, SHORT, check_against_runner, make, needs_compiler
 
 STREAM = 15
 
@@ -61,7 +61,9 @@ def with_stages(patch: pytest.MonkeyPatch, effect: SensorStage, *commands: Any) 
         made = make_axis(self, *arguments, **options)
         accelerometer, *others = made.at_work
         stages = (*accelerometer.stages[:-1], effect, accelerometer.stages[-1])
-        return replace(made, at_work=(replace(accelerometer, stages=stages), *others), commands=commands)
+        return replace(
+            made, at_work=(replace(accelerometer, stages=stages), *others), commands=(*made.commands, *commands)
+        )
 
     patch.setattr(Design, "axis_control", axis_control)
 
@@ -69,7 +71,7 @@ def with_stages(patch: pytest.MonkeyPatch, effect: SensorStage, *commands: Any) 
 @needs_compiler
 def test_stages_of_ones_own_without_a_line_of_c(monkeypatch: pytest.MonkeyPatch) -> None:
     with_stages(monkeypatch, Lagging(), Smoothing())
-    check_against_runner(make("linear", *SHORT, "sensors.accelerometer.counts_per_g=0"))
+    check_against_runner(make("linear", *SHORT, *EFFECTS, "sensors.accelerometer.counts_per_g=0"))
 
 
 def test_a_stage_that_counts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,7 +44,7 @@ typedef struct {
     module_type modules[MOST_GIMBALS];
     double rate_limit; /* [rad/s] */
     double raw_rate;   /* samples a second inside the accelerometers */
-    double settings_at_first[SETTINGS]; /* unless the model says otherwise [m/s^2, m/s^2, rad] */
+    double unless_configured[SETTINGS]; /* [m/s^2, m/s^2, rad] */
     int servos, motors; /* places of the actuators' numbers, one a gimbal */
     int shows;          /* place of the places in sensordata of what plugin sensors show, -1 where there is none */
     int settings, shown;
@@ -58,7 +58,10 @@ typedef struct {
     int offset; /* behind its first number */
 } input_type;
 
-/* A sensor's numbers, and its effects: recorded from cmg_mj/sensors. */
+/* A recorded formula, of the state and a signal, to a signal. */
+typedef void formula(double *s, const double *x, double *y);
+
+/* A sensor: cmg_mj/core/sensor.py. */
 typedef struct {
     int channels, width; /* numbers of a sample, and of a reading */
     int period, raw;     /* from one reading to the next; from one sample inside the part to the next */
@@ -68,9 +71,7 @@ typedef struct {
     int kept, older_kept;
     int readings, older; /* places of the last ones, the newest first */
     int delivered;
-    void (*ideal)(double *s, double *x);
-    void (*init)(double *s, const double *x, double *y);
-    void (*take)(double *s, const double *x, double *y);
+    formula *ideal, *init, *take; /* what a perfect one shows; the first sample; a sample after others */
 } sensor_type;
 
 typedef struct {
@@ -81,17 +82,15 @@ typedef struct {
     int period;         /* instants from one decision to the next */
     int settled;        /* the instant from which on no memory is trimmed */
     int axes, sensors, inputs, streams;
-    const axis_type *axis;
-    const sensor_type *sensor;
-    const input_type *input;
-    const int *stream;
     int from;       /* place of the places of the inputs in sensordata and qvel; then come others that stay, */
     int held, rate; /* up to the rates of the gimbals until this instant, and from it on [rad/s] */
     int taken;      /* place of the inputs of this instant */
     int shown, memory, noise, size; /* places in this order: what is shown, what the decisions remember, generators */
-    void (*first)(double *s); /* decisions */
-    void (*trimmed)(double *s);
-    void (*later)(double *s);
+    const axis_type *axis;
+    const sensor_type *sensor;
+    const input_type *input;
+    const int *stream;
+    formula *first, *trimmed, *later; /* decisions; their signals are none */
 } rig_type;
 
 extern const rig_type rig;

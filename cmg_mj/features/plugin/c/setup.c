@@ -174,7 +174,7 @@ static int configure(const search *in, int instance, double *state)
     for (int i = 0; i < rig.axes; ++i) {
         const axis_type *axis = &rig.axis[i];
         double *settings = state + axis->settings;
-        memcpy(settings, axis->settings_at_first, sizeof axis->settings_at_first);
+        memcpy(settings, axis->unless_configured, sizeof axis->unless_configured);
         if (density >= 0.0) settings[FORCE_SIGMA] = density * 1e-6 * STANDARD_GRAVITY * sqrt(axis->raw_rate / 2.0);
         if (force_counts >= 0.0) settings[FORCE_STEP] = force_counts > 0.0 ? STANDARD_GRAVITY / force_counts : 0.0;
         if (angle_counts >= 0.0) settings[ANGLE_STEP] = angle_counts > 0.0 ? TURN / angle_counts : 0.0;

@@ -67,7 +67,7 @@ static void sample(const sensor_type *sensor, double *s, double instant)
     const int is_older = sensor->skew && !is_first && is_due(instant + sensor->skew, sensor->raw);
     const int half = sensor->channels / 2, last = (sensor->older_kept - 1) * sensor->channels;
     if (!is_taken && !is_older) return;
-    sensor->ideal(s, x);
+    sensor->ideal(s, x, x);
     for (int i = 0; i < (is_first ? sensor->older_kept : is_older); ++i)
         shift(s + sensor->older, sensor->older_kept, sensor->channels, x);
     if (!is_taken) return;
@@ -95,7 +95,7 @@ int state_advance(double *s)
     for (int i = 0; i < rig.sensors; ++i) sample(&rig.sensor[i], s, instant);
     if (!is_due(instant, rig.period)) return 1;
     for (int i = 0; i < rig.sensors; ++i) deliver(&rig.sensor[i], s, instant);
-    (instant == 0.0 ? rig.first : instant < rig.settled ? rig.trimmed : rig.later)(s);
+    (instant == 0.0 ? rig.first : instant < rig.settled ? rig.trimmed : rig.later)(s, s, s);
     for (int i = 0; i < rig.axes; ++i) {
         const axis_type *axis = &rig.axis[i];
         const int estimate = axis->shown + SHOWN_ESTIMATE;
