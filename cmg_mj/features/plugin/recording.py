@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from typing import Any, NamedTuple
 
 import mujoco
@@ -28,6 +29,9 @@ OF_STAGES = (Symbolic, *FLOATS)
 CONFIGURED = (0, White, "sigma"), (0, Digital, "resolution"), (1, Digital, "resolution")
 """Numbers of an axis that a model's <config> may change: the sensor, its stage, the stage's field."""
 
+OF = "\n"
+"""Between a given number's name and the function whose own it is; numbers of all functions have none."""
+
 Row = list[tuple[str, Operand]]
 """Numbers that are written at once: name of a number in the state, or its text in C -> number."""
 
@@ -46,15 +50,17 @@ class Recorder:
         self.tape = Tape()
         self.functions: dict[str, list[str | Row]] = {}
         self.places: dict[str, int] = {}
+        self._owners = count()
 
     def begin(self, name: str) -> None:
         """Begin a function."""
         self.name = name
         self.steps = self.functions[name] = []
+        self.owner = next(self._owners)
 
     def inputs(self, name: str, count: int) -> list[Symbol]:
-        """Append numbers that are given; `{}` in their name stands for their index."""
-        return [self.tape.input(name.format(i)) for i in range(count)]
+        """Append numbers that the function is given; `{}` in their name stands for their index."""
+        return [self.tape.input(f"{name.format(i)}{OF}{self.owner}") for i in range(count)]
 
     def repeated(self, name: str, tree: Any, runs: Sequence[Callable[[Any], tuple[Any, Row]]]) -> Any:
         """Record a function with a memory several times, each time with the memory that the time before has left.
@@ -73,13 +79,12 @@ class Recorder:
         recorded = []
         for run in runs:
             self.begin(name)
-            before = [self.tape.input(one) for one, _ in self.remembered(tree)]
+            before = self.inputs(f"{_part(name)} {{}}", len(_leaves(tree)))
             after, results = run(_rebuilt(tree, iter(before)))
             if form(after) != form(tree):
                 raise InputError(f"{name}: its memory changes its form")
-            results = [*self.remembered(after), *results]
-            recorded.append((list(self.steps), [(target, self.tape.place(number)) for target, number in results]))
-            self.steps.append(results)
+            self.steps.append([*self.remembered(after), *results])
+            recorded.append(self._lines(name))
             tree = after
         if any(one != recorded[0] for one in recorded):
             raise InputError(f"{name}: depends on the number of the sample or the step otherwise than by its noise")
@@ -87,14 +92,13 @@ class Recorder:
 
     def remembered(self, tree: Any) -> Row:
         """List the numbers of a memory of the function that is recorded, with their names."""
-        return row(f"{self.name.partition('_')[0]} {{}}", _leaves(tree))
+        return row(f"{_part(self.name)} {{}}", _leaves(tree))
 
     def used(self, parts: Collection[str]) -> set[str]:
         """Find the names of the numbers that the functions of some parts take."""
         steps = [step for name in self.functions if _part(name) in parts for step in self.functions[name]]
         places = [self.tape.place(number) for step in steps if not isinstance(step, str) for _, number in step]
-        operations = [self.tape.operations[place] for place in self.tape.needed(places)]
-        return {operation.value for operation in operations if operation.name == INPUT}
+        return {name for name, _ in self._given(places).values()}
 
     def locate(self, names: Sequence[str], first: int) -> int:
         """Give names the next places; the state's first one is given. Return the first of them."""
@@ -104,27 +108,43 @@ class Recorder:
 
     def printed(self, parts: Collection[str]) -> str:
         """Print the functions of some parts in C."""
-        text = ""
-        for name, steps in self.functions.items():
-            if _part(name) in parts:
-                lines = [line for step in steps for line in ([step] if isinstance(step, str) else self._block(step))]
-                inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *lines])
-                text += f"static void {name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
+        functions = [name for name in self.functions if _part(name) in parts]
+        text = f"static formula {', '.join(functions)};\n\n"
+        for name in functions:
+            inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *self._lines(name)])
+            text += f"static void {name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
         return text
 
-    def _block(self, written: Row) -> list[str]:
-        places = [self.tape.place(number) for _, number in written]
+    def _lines(self, function: str) -> list[str]:
+        """Print the body of a function."""
+        lines: list[str] = []
+        owners = set()
+        for step in self.functions[function]:
+            if isinstance(step, str):
+                lines.append(step)
+                continue
+            places = [self.tape.place(number) for _, number in step]
+            given = self._given(places)
+            owners |= {owner for _, owner in given.values() if owner}
+            names = [self._text(name) for name, _ in given.values()]
+            targets = [self._text(name) for name, _ in step]
+            lines += ["{", *body(Formula(self.tape, [*given], places), names, targets, "double", "double"), "}"]
+        if len(owners) > 1:
+            raise InputError(f"{function}: remembers a number elsewhere than in its memory, which C would not have")
+        return lines
+
+    def _given(self, places: Sequence[int]) -> dict[int, tuple[str, str]]:
+        """Find the given numbers that others depend on: place -> name, and the function whose own it is."""
         operations = self.tape.operations
         given = [place for place in sorted(self.tape.needed(places)) if operations[place].name == INPUT]
-        names = [self._text(operations[place].value) for place in given]
-        targets = [self._text(name) for name, _ in written]
-        return ["{", *body(Formula(self.tape, given, places), names, targets, "double", "double"), "}"]
+        values = [operations[place].value.partition(OF) for place in given]
+        return {place: (name, owner) for place, (name, _, owner) in zip(given, values, strict=True)}
 
     def _text(self, name: str) -> str:
         return f"s[{self.places[name]}]" if name in self.places else name
 
 
-def row(name: str, values: Sequence[Operand]) -> Row:
+def row(name: str, values: Iterable[Operand]) -> Row:
     """Name numbers; `{}` in the name stands for their index."""
     return [(name.format(i), value) for i, value in enumerate(values)]
 
@@ -199,20 +219,21 @@ class Stream:
         Returns:
             The memory behind the loop, and the mean of the results.
         """
-        recorder, name, steps, count = self._recorder, self._recorder.name, self._recorder.steps, len(memory)
-        number = len(steps)
-        steps.append(f"double r{number}[{count}];")
-        steps.append(row(f"r{number}[{{}}]", memory))
-        del recorder.functions[name]  # it comes behind the one that it calls
-        recorder.begin(f"{name}_{number}")
-        after, result = formula(recorder.inputs("s[{}]", count), recorder.inputs("x[{}]", self._width))
+        recorder = self._recorder
+        number, size = len(recorder.steps), len(memory)
+        looping = f"{recorder.name}_{number}"
+        words = f"{generator(self._number)}, {self._width}, {looping}, r{number}, {samples}, {piece}"
+        recorder.steps.append(f"double r{number}[{size}];")
+        recorder.steps.append(row(f"r{number}[{{}}]", memory))
+        recorder.steps.append(f"const double m{number} = noise_mean(s + {words});")
+        behind = recorder.inputs(f"r{number}[{{}}]", size), *recorder.inputs(f"m{number}", 1)
+        outer = recorder.name, recorder.steps, recorder.owner
+        recorder.begin(looping)
+        after, result = formula(recorder.inputs("s[{}]", size), recorder.inputs("x[{}]", self._width))
         recorder.steps.append([*row("s[{}]", after), ("y[0]", result)])
-        words = f"{generator(self._number)}, {self._width}, {recorder.name}, r{number}, {samples}, {piece}"
-        steps.append(f"const double m{number} = noise_mean(s + {words});")
-        recorder.name, recorder.steps = name, steps
-        recorder.functions[name] = steps
+        recorder.name, recorder.steps, recorder.owner = outer
         self._next += samples
-        return recorder.inputs(f"r{number}[{{}}]", count), recorder.tape.input(f"m{number}")
+        return behind
 
 
 class RecordedSensor(NamedTuple):
@@ -270,9 +291,7 @@ def record(control: RigControl, plant: Plant) -> RecordedRig:
     given = given_by(plant.model)
     ideal = plant.ideal_readings(*([recorder.tape.input(name) for name in names] for names in given))
     streams = {number: Stream(recorder, number, width) for number, width in control.draws.items()}
-    pairs = [
-        _configured(axis, recorder.inputs(f"setting {i} {{}}", len(CONFIGURED))) for i, axis in enumerate(control.axes)
-    ]
+    pairs = [_configured(recorder.tape, i, axis) for i, axis in enumerate(control.axes)]
     control = replace(control, axes=tuple(axis for axis, _ in pairs))
     sensors = [
         [_sensor(recorder, f"a{i}s{k}", sensor, own, streams) for k, sensor in enumerate(axis.at_work)]
@@ -305,14 +324,14 @@ def c_text(text: str) -> str:
     return f'"{"".join(letters)}"'
 
 
-def _configured(axis: AxisControl, symbols: Sequence[Symbol]) -> tuple[AxisControl, list[float]]:
+def _configured(tape: Tape, number: int, axis: AxisControl) -> tuple[AxisControl, list[float]]:
     """Return an axis with symbols as its settings, whose observer and law may remember symbols; and the settings."""
     at_work, values = list(axis.at_work), []
-    for symbol, (part, kind, name) in zip(symbols, CONFIGURED, strict=True):
-        stages = list(at_work[part].stages)
-        (place,) = (i for i, stage in enumerate(stages) if type(stage) is kind)
+    for i, (part, kind, name) in enumerate(CONFIGURED):
+        stages: list[Any] = list(at_work[part].stages)
+        (place,) = (k for k, stage in enumerate(stages) if type(stage) is kind)
         values.append(getattr(stages[place], name))
-        stages[place] = replace(stages[place], **{name: symbol})
+        stages[place] = replace(stages[place], **{name: tape.input(f"setting {number} {i}")})
         at_work[part] = replace(at_work[part], stages=tuple(stages))
     observers, law = copy.deepcopy((axis.observers, axis.law))
     return replace(axis, observers=observers, law=law, at_work=tuple(at_work)), values
@@ -323,13 +342,13 @@ def _sensor(recorder: Recorder, name: str, sensor: Sensor, ideal: Any, streams: 
     signal = sensor.ideal(ideal)
     recorder.begin(f"{name}_ideal")
     recorder.steps.append(row("y[{}]", signal))
-    x = recorder.inputs("x[{}]", len(signal))
     recorder.begin(f"{name}_init")
-    memory, reading = sensor.started(x, ideal, streams)
+    memory, reading = sensor.started(recorder.inputs("x[{}]", len(signal)), ideal, streams)
     remembered = recorder.remembered(memory)
     recorder.steps.append([*remembered, *row("y[{}]", reading)])
 
     def taken(before: Any, sample: int) -> tuple[Any, Row]:
+        x = recorder.inputs("x[{}]", len(signal))
         after, reading = sensor.passed(before, x, ideal, sample, streams)
         return after, row("y[{}]", reading)
 

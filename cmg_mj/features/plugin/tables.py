@@ -22,7 +22,6 @@ from cmg_mj.features.export import compiler as c_compiler
 from cmg_mj.features.plugin.driver import check_noise
 from cmg_mj.features.plugin.model import QUANTITIES
 from cmg_mj.features.plugin.recording import (
-    CONFIGURED,
     RecordedRig,
     RecordedSensor,
     Recorder,
@@ -32,21 +31,12 @@ from cmg_mj.features.plugin.recording import (
 )
 from cmg_mj.plant.plant import Plant
 
-MAX_AXES = 4
-MAX_GIMBALS = 8
-MAX_ESTIMATES = 64
-MAX_CHANNELS = 32
-MAX_WIDTH = 64
-"""Sizes of the C's arrays."""
 HEAD = 10
 """Numbers at the state's beginning."""
 SHOWN = 5
 """Numbers that are shown of an axis before its estimate."""
 NOISE_WORDS = 8
 """Numbers of a noise stream's generator."""
-
-Value = int | float | str | Sequence["Value"]
-"""A value in C; a sequence is a row or a struct."""
 
 
 class PluginRig(NamedTuple):
@@ -182,8 +172,8 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     Raises:
         InputError: Something in use cannot be recorded.
     """
+    check_noise(rig.seed, rig.world)
     recorded = record(rig.control, rig.plant)
-    refuse_unsupported(rig, recorded)
     files = common_files()
     files["rig.c"] = format_rig(rig, recorded, "")
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
@@ -191,23 +181,6 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     sources = [*COMMON_SOURCES, "rig.c"]
     prefix = rig.plant.axes[0].prefix
     return PluginCode(name, files | extra_files(name, files, sources, prefix), sources, build)
-
-
-def refuse_unsupported(rig: PluginRig, recorded: RecordedRig) -> None:
-    """Refuse what is more than the C has room for.
-
-    Raises:
-        InputError: Something is.
-    """
-    counts = [(len(rig.plant.axes), "axes", MAX_AXES)]
-    counts += [(len(axis.modules), "modules on an axis", MAX_GIMBALS) for axis in rig.plant.axes]
-    counts += [(_estimates(control), "estimates", MAX_ESTIMATES) for control in rig.control.axes]
-    counts += [(max(one.channels, len(one.delivered)), "numbers of a sensor", MAX_CHANNELS) for one in recorded.sensors]
-    counts += [(width, "numbers of a noise stream", MAX_WIDTH) for width in rig.control.draws.values()]
-    for count, what, most in counts:
-        if count > most:
-            raise InputError(f"{count} {what}: a plugin takes at most {most}")
-    check_noise(rig.seed, rig.world)
 
 
 def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
@@ -229,40 +202,40 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
         return recorder.locate([f"{name} {i}" for i in range(count)], HEAD)
 
     inputs = locate("input", len(recorded.inputs))
-    rows = []
+    rows, modules = [], []
     for i, (axis, control) in enumerate(zip(rig.plant.axes, controls, strict=True)):
-        modules = [(one.name, one.direction, one.speed, one.gimbal_zero) for one in axis.modules]
-        numbers = (control.law.rate_limit, control.sensors.accelerometer.raw_rate_hz, recorded.settings[i])
-        counts = {"servo": len(modules), "motor": len(modules), "show": len(QUANTITIES), "setting": len(CONFIGURED)}
+        gimbals, settings = len(axis.modules), recorded.settings[i]
+        numbers = control.law.rate_limit, control.sensors.accelerometer.raw_rate_hz, _struct(settings)
+        counts = {"servo": gimbals, "motor": gimbals, "show": len(QUANTITIES), "setting": len(settings)}
         places = [locate(f"{name} {i}", count) for name, count in counts.items()]
-        rows.append([axis.prefix, len(modules), _estimates(control), modules, *numbers, *places])
+        own = f"modules + {len(modules)}"
+        rows.append([c_text(axis.prefix), gimbals, _estimates(control), own, *numbers, *places])
+        modules += [_struct([c_text(one.name), one.direction, one.speed, one.gimbal_zero]) for one in axis.modules]
     held, rate = locate("held", len(controls)), locate("rate", len(controls))
     taken = recorder.locate(recorded.inputs, HEAD)
     rows_of_sensors = [_describe_sensor(one, steps, recorder) for one in sensors]
     shown = [locate(f"shown {i}", SHOWN + _estimates(control)) for i, control in enumerate(controls)]
     memory = recorder.locate(recorded.memory, HEAD)
     draws = all_draws([*(one.sensor for one in sensors), *rig.control.between])
-    generators = [locate(generator(stream), NOISE_WORDS) for stream in draws]
-    size = HEAD + len(recorder.places)
+    noise = recorder.locate([], HEAD)
+    generators = [f"{generator(stream)} = {locate(generator(stream), NOISE_WORDS)}" for stream in draws]
     tables = {
-        "axis_type axes": [_value([*row, place]) for row, place in zip(rows, shown, strict=True)],
+        "axis_type axes": [_struct([*row, place]) for row, place in zip(rows, shown, strict=True)],
         "sensor_type sensors": rows_of_sensors,
         "input_type inputs": recorded.inputs,
-        "int streams": list(map(str, draws)),
+        "int streams": list(draws),
     }
     settled = -(-max(axis.settled for axis in controls) // steps)
     trimmed = "rig_trimmed" if "rig_trimmed" in recorder.functions else "rig_later"
     numbers = [
-        *(rig.plugin, build, float(rig.seed), float(rig.world), steps * controls[0].timestep),
+        *(c_text(rig.plugin), c_text(build), rig.seed, rig.world, steps * controls[0].timestep),
         *(rig.control.period // steps, settled, *map(len, tables.values())),
-        *(inputs, held, rate, taken, shown[0], memory, generators[0] if generators else size, size),
+        *(inputs, held, rate, taken, shown[0], memory, noise, recorder.locate([], HEAD)),
+        *("axes", "sensors", "inputs", "streams", "rig_first", trimmed, "rig_later"),
     ]
     printed = "".join(
-        f"static const {name}[] = {{\n{''.join(f'    {one},{chr(10)}' for one in values or ['0'])}}};\n\n"
-        for name, values in tables.items()
-    )
-    enumerated = "".join(
-        f"enum {{ {generator(stream)} = {place} }};\n" for stream, place in zip(draws, generators, strict=True)
+        f"static const {name}[] = {{\n    {f',{chr(10)}    '.join(map(str, values or [0]))},\n}};\n\n"
+        for name, values in {"module_type modules": modules, **tables}.items()
     )
     return f"""/* The rig: its sensors and decisions, recorded as functions of the state, and its numbers. */
 #include "rig.h"
@@ -271,12 +244,15 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
 
 #include <math.h>
 
-{enumerated}
-{recorder.printed(recorded.parts)}{printed}const rig_type rig = {{
-    {", ".join(map(_value, numbers))},
-    axes, sensors, inputs, streams, rig_first, {trimmed}, rig_later
-}};
+enum {{ {", ".join(["NONE", *generators])} }};
+
+{recorder.printed(recorded.parts)}{printed}const rig_type rig = {_struct(numbers)};
 """
+
+
+def _struct(values: Sequence[object]) -> str:
+    """Print a struct or a row, a float as C reads it exactly."""
+    return f"{{{', '.join(map(str, values))}}}"
 
 
 def _estimates(control: AxisControl) -> int:
@@ -297,15 +273,4 @@ def _describe_sensor(one: RecordedSensor, steps: int, recorder: Recorder) -> str
         *(recorder.locate(on_the_way, HEAD) if on_the_way else delivered, recorder.locate(older, HEAD), delivered),
     ]
     functions = [f"{one.name}_{part}" for part in ("ideal", "init", "take")]
-    return f"{{{', '.join(map(str, [*numbers, *functions]))}}}"
-
-
-def _value(value: Value) -> str:
-    """Print a number, a text, or a row or struct of them; every number as C reads it exactly."""
-    if isinstance(value, str):
-        return c_text(value)
-    if isinstance(value, int):
-        return str(int(value))
-    if isinstance(value, float):
-        return repr(float(value))
-    return f"{{{', '.join(map(_value, value))}}}"
+    return _struct([*numbers, *functions])

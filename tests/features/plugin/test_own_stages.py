@@ -42,6 +42,16 @@ class Counting(SensorStage):
         return memory, [x + 0.001 * sample for x in signal]
 
 
+class Hoarding(SensorStage):
+    """An effect whose memory is elsewhere."""
+
+    before: Any = None
+
+    def step(self, memory: Any, signal: Any, ideal: Any, sample: int, tables: Any) -> Any:
+        before, self.before = self.before or signal, signal
+        return memory, [0.5 * (x + last) for x, last in zip(signal, before, strict=True)]
+
+
 @dataclass(frozen=True)
 class Smoothing:
     """A mean of two commands."""
@@ -74,7 +84,13 @@ def test_stages_of_ones_own_without_a_line_of_c(monkeypatch: pytest.MonkeyPatch)
     check_against_runner(make("linear", *SHORT, *EFFECTS, "sensors.accelerometer.counts_per_g=0"))
 
 
-def test_a_stage_that_counts_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    with_stages(monkeypatch, Counting())
-    with pytest.raises(InputError, match="depends on the number of the sample"):
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [(Counting(), "depends on the number of the sample"), (Hoarding(), "remembers a number elsewhere")],
+)
+def test_a_stage_that_is_no_formula_is_refused(
+    effect: SensorStage, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with_stages(monkeypatch, effect)
+    with pytest.raises(InputError, match=words):
         make_plugin(prepare(load_scenario("push_recovery", SHORT, "linear")))

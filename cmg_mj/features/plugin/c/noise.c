@@ -143,7 +143,7 @@ double noise_mean(
     double generator[NOISE_WORDS], int width, void (*step)(double *memory, const double *normals, double *result),
     double *memory, int samples, int piece)
 {
-    double normals[NOISE_WIDTH], result, mean = 0.0;
+    double normals[width], result, mean = 0.0;
     for (int from = 0; from < samples; from += piece) {
         double sum = 0.0;
         for (int i = 0; i < piece && from + i < samples; ++i) {

@@ -4,7 +4,7 @@
 #ifndef CMG_MJ_NOISE_H
 #define CMG_MJ_NOISE_H
 
-enum { NOISE_WORDS = 8, NOISE_WIDTH = 64 };
+enum { NOISE_WORDS = 8 };
 
 /* Largest seed and world: a double holds every integer up to it. */
 #define NOISE_LARGEST 9007199254740992.0

@@ -6,8 +6,6 @@
 #ifndef CMG_MJ_RIG_H
 #define CMG_MJ_RIG_H
 
-enum { MOST_AXES = 4, MOST_GIMBALS = 8, MOST_ESTIMATES = 64, MOST_CHANNELS = 32 };
-
 /* The head. A program may write SEED and WORLD before the first step. */
 enum {
     SEED,
@@ -41,7 +39,7 @@ typedef struct {
 typedef struct {
     const char *prefix; /* before the names of its sensors: empty, or AXIS/ */
     int gimbals, estimates;
-    module_type modules[MOST_GIMBALS];
+    const module_type *modules; /* one a gimbal */
     double rate_limit; /* [rad/s] */
     double raw_rate;   /* samples a second inside the accelerometers */
     double unless_configured[SETTINGS]; /* [m/s^2, m/s^2, rad] */

@@ -62,7 +62,7 @@ static void shift(double *rows, int n, int width, const double *row)
 /* Take what is due, as `Sensor.init` and `Sensor.sample` of cmg_mj/core/sensor.py do. */
 static void sample(const sensor_type *sensor, double *s, double instant)
 {
-    double x[MOST_CHANNELS], y[MOST_CHANNELS];
+    double x[sensor->channels], y[sensor->width];
     const int is_first = instant == 0.0, is_taken = is_due(instant, sensor->raw);
     const int is_older = sensor->skew && !is_first && is_due(instant + sensor->skew, sensor->raw);
     const int half = sensor->channels / 2, last = (sensor->older_kept - 1) * sensor->channels;
