@@ -226,14 +226,15 @@ class Stream:
         recorder.steps.append(f"double r{number}[{size}];")
         recorder.steps.append(row(f"r{number}[{{}}]", memory))
         recorder.steps.append(f"const double m{number} = noise_mean(s + {words});")
-        behind = recorder.inputs(f"r{number}[{{}}]", size), *recorder.inputs(f"m{number}", 1)
+        behind = recorder.inputs(f"r{number}[{{}}]", size)
+        (mean,) = recorder.inputs(f"m{number}", 1)
         outer = recorder.name, recorder.steps, recorder.owner
         recorder.begin(looping)
         after, result = formula(recorder.inputs("s[{}]", size), recorder.inputs("x[{}]", self._width))
         recorder.steps.append([*row("s[{}]", after), ("y[0]", result)])
         recorder.name, recorder.steps, recorder.owner = outer
         self._next += samples
-        return behind
+        return behind, mean
 
 
 class RecordedSensor(NamedTuple):
