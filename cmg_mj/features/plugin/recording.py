@@ -6,7 +6,6 @@ import copy
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import count
 from typing import Any, NamedTuple
 
 import mujoco
@@ -18,6 +17,7 @@ from cmg_mj.core.rig import Decision, Readings, RigControl, RigDeciding, ideals_
 from cmg_mj.core.sensor import Digital, Sensor, SensorState
 from cmg_mj.core.tape import INPUT, Operand, Symbol, Tape
 from cmg_mj.core.tree import FLOATS, form, numbers, rebuild
+from cmg_mj.core.types import IdealReading
 from cmg_mj.features.export.c_code import body
 from cmg_mj.features.export.formula import Formula
 from cmg_mj.plant.elements import joint_sizes
@@ -29,38 +29,81 @@ OF_STAGES = (Symbolic, *FLOATS)
 CONFIGURED = (0, White, "sigma"), (0, Digital, "resolution"), (1, Digital, "resolution")
 """Numbers of an axis that a model's <config> may change: the sensor, its stage, the stage's field."""
 
-OF = "\n"
-"""Between a given number's name and the function whose own it is; numbers of all functions have none."""
-
 Row = list[tuple[str, Operand]]
 """Numbers that are written at once: name of a number in the state, or its text in C -> number."""
 
 
+class Function(NamedTuple):
+    """A function in C of the state's numbers `s`, of a signal `x`, to a signal `y`."""
+
+    name: str
+    """What it has before the first `_` it has in common with the functions of the same part."""
+    tape: Tape
+    """Its operations."""
+    steps: list[str | Row]
+    """Lines, and numbers that it writes."""
+
+    def rows(self) -> list[tuple[list[str], Formula]]:
+        """List the formulas of what it writes, each with the names of the results."""
+        formulas = []
+        for step in self.steps:
+            if not isinstance(step, str):
+                places = [self.tape.place(number) for _, number in step]
+                needed = sorted(self.tape.needed(places))
+                given = [place for place in needed if self.tape.operations[place].name == INPUT]
+                formulas.append(([name for name, _ in step], Formula(self.tape, given, places)))
+        return formulas
+
+    def inputs(self, formula: Formula) -> list[str]:
+        """Name the given numbers of a formula."""
+        return [self.tape.operations[place].value for place in formula.inputs]
+
+    @property
+    def part(self) -> str:
+        """Name of the part."""
+        return _part(self.name)
+
+
 class Recorder:
-    """Records functions in C of a state's numbers `s`, of a signal `x`, to a signal `y`.
+    """Records functions.
+
+    Args:
+        control: The control of the rig.
+        plant: The plant.
 
     Attributes:
-        tape: Their operations.
-        functions: Name -> lines, and rows of numbers that it writes. What a name has before its first `_` it has in
-            common with those of the same part.
+        control: The control.
+        function: The function that is recorded.
+        functions: Those that have been recorded, by name.
+        given: Names of the numbers in sensordata and in qvel.
         places: Name of a number -> its place in the state.
     """
 
-    def __init__(self) -> None:
-        self.tape = Tape()
-        self.functions: dict[str, list[str | Row]] = {}
+    def __init__(self, control: RigControl, plant: Plant) -> None:
+        self.control, self._plant = control, plant
+        self.given = given_by(plant.model)
+        self.functions: dict[str, Function] = {}
         self.places: dict[str, int] = {}
-        self._owners = count()
 
     def begin(self, name: str) -> None:
         """Begin a function."""
-        self.name = name
-        self.steps = self.functions[name] = []
-        self.owner = next(self._owners)
+        self.function = self.functions[name] = Function(name, Tape(), [])
 
     def inputs(self, name: str, count: int) -> list[Symbol]:
         """Append numbers that the function is given; `{}` in their name stands for their index."""
-        return [self.tape.input(f"{name.format(i)}{OF}{self.owner}") for i in range(count)]
+        return self.named([name.format(i) for i in range(count)])
+
+    def named(self, names: Sequence[str]) -> list[Symbol]:
+        """Append numbers of these names that the function is given."""
+        return list(map(self.function.tape.input, names))
+
+    def rig(self) -> tuple[RigControl, Readings]:
+        """Return the control and the readings of perfect sensors, of symbols of the function."""
+        axes = [
+            _configured(axis, self.inputs(f"setting {i} {{}}", len(CONFIGURED)))
+            for i, axis in enumerate(self.control.axes)
+        ]
+        return replace(self.control, axes=tuple(axes)), self._plant.ideal_readings(*map(self.named, self.given))
 
     def repeated(self, name: str, tree: Any, runs: Sequence[Callable[[Any], tuple[Any, Row]]]) -> Any:
         """Record a function with a memory several times, each time with the memory that the time before has left.
@@ -83,8 +126,10 @@ class Recorder:
             after, results = run(_rebuilt(tree, iter(before)))
             if form(after) != form(tree):
                 raise InputError(f"{name}: its memory changes its form")
-            self.steps.append([*self.remembered(after), *results])
-            recorded.append(self._lines(name))
+            self.function.steps.append([*self.remembered(after), *results])
+            lines = [step for step in self.function.steps if isinstance(step, str)]
+            formulas = [(names, formula.outputs) for names, formula in self.function.rows()]
+            recorded.append((lines, formulas, self.function.tape.operations))
             tree = after
         if any(one != recorded[0] for one in recorded):
             raise InputError(f"{name}: depends on the number of the sample or the step otherwise than by its noise")
@@ -92,13 +137,12 @@ class Recorder:
 
     def remembered(self, tree: Any) -> Row:
         """List the numbers of a memory of the function that is recorded, with their names."""
-        return row(f"{_part(self.name)} {{}}", _leaves(tree))
+        return row(f"{self.function.part} {{}}", _leaves(tree))
 
     def used(self, parts: Collection[str]) -> set[str]:
         """Find the names of the numbers that the functions of some parts take."""
-        steps = [step for name in self.functions if _part(name) in parts for step in self.functions[name]]
-        places = [self.tape.place(number) for step in steps if not isinstance(step, str) for _, number in step]
-        return {name for name, _ in self._given(places).values()}
+        functions = [function for function in self.functions.values() if function.part in parts]
+        return {name for one in functions for _, formula in one.rows() for name in one.inputs(formula)}
 
     def locate(self, names: Sequence[str], first: int) -> int:
         """Give names the next places; the state's first one is given. Return the first of them."""
@@ -108,40 +152,21 @@ class Recorder:
 
     def printed(self, parts: Collection[str]) -> str:
         """Print the functions of some parts in C."""
-        functions = [name for name in self.functions if _part(name) in parts]
-        text = f"static formula {', '.join(functions)};\n\n"
-        for name in functions:
-            inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *self._lines(name)])
-            text += f"static void {name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
+        functions = [function for function in self.functions.values() if function.part in parts]
+        text = f"static formula {', '.join(function.name for function in functions)};\n\n"
+        for function in functions:
+            blocks = [
+                ["{", *body(formula, *map(self._texts, (function.inputs(formula), names)), "double", "double"), "}"]
+                for names, formula in function.rows()
+            ]
+            rows = iter(blocks)
+            lines = [line for step in function.steps for line in ([step] if isinstance(step, str) else next(rows))]
+            inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *lines])
+            text += f"static void {function.name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
         return text
 
-    def _lines(self, function: str) -> list[str]:
-        """Print the body of a function."""
-        lines: list[str] = []
-        owners = set()
-        for step in self.functions[function]:
-            if isinstance(step, str):
-                lines.append(step)
-                continue
-            places = [self.tape.place(number) for _, number in step]
-            given = self._given(places)
-            owners |= {owner for _, owner in given.values() if owner}
-            names = [self._text(name) for name, _ in given.values()]
-            targets = [self._text(name) for name, _ in step]
-            lines += ["{", *body(Formula(self.tape, [*given], places), names, targets, "double", "double"), "}"]
-        if len(owners) > 1:
-            raise InputError(f"{function}: remembers a number elsewhere than in its memory, which C would not have")
-        return lines
-
-    def _given(self, places: Sequence[int]) -> dict[int, tuple[str, str]]:
-        """Find the given numbers that others depend on: place -> name, and the function whose own it is."""
-        operations = self.tape.operations
-        given = [place for place in sorted(self.tape.needed(places)) if operations[place].name == INPUT]
-        values = [operations[place].value.partition(OF) for place in given]
-        return {place: (name, owner) for place, (name, _, owner) in zip(given, values, strict=True)}
-
-    def _text(self, name: str) -> str:
-        return f"s[{self.places[name]}]" if name in self.places else name
+    def _texts(self, names: Sequence[str]) -> list[str]:
+        return [f"s[{self.places[name]}]" if name in self.places else name for name in names]
 
 
 def row(name: str, values: Iterable[Operand]) -> Row:
@@ -186,7 +211,7 @@ class Stream:
         Raises:
             InputError: It is neither the next one nor the last one of the same function.
         """
-        steps = self._recorder.steps
+        steps = self._recorder.function.steps
         if sample == self._next:
             drawn = f"d{len(steps)}"
             steps.append(f"double {drawn}[{self._width}];")
@@ -219,22 +244,19 @@ class Stream:
         Returns:
             The memory behind the loop, and the mean of the results.
         """
-        recorder = self._recorder
-        number, size = len(recorder.steps), len(memory)
-        looping = f"{recorder.name}_{number}"
+        recorder, outer = self._recorder, self._recorder.function
+        number, size = len(outer.steps), len(memory)
+        looping = f"{outer.name}_{number}"
         words = f"{generator(self._number)}, {self._width}, {looping}, r{number}, {samples}, {piece}"
-        recorder.steps.append(f"double r{number}[{size}];")
-        recorder.steps.append(row(f"r{number}[{{}}]", memory))
-        recorder.steps.append(f"const double m{number} = noise_mean(s + {words});")
-        behind = recorder.inputs(f"r{number}[{{}}]", size)
-        (mean,) = recorder.inputs(f"m{number}", 1)
-        outer = recorder.name, recorder.steps, recorder.owner
+        outer.steps.append(f"double r{number}[{size}];")
+        outer.steps.append(row(f"r{number}[{{}}]", memory))
+        outer.steps.append(f"const double m{number} = noise_mean(s + {words});")
         recorder.begin(looping)
         after, result = formula(recorder.inputs("s[{}]", size), recorder.inputs("x[{}]", self._width))
-        recorder.steps.append([*row("s[{}]", after), ("y[0]", result)])
-        recorder.name, recorder.steps, recorder.owner = outer
+        recorder.function.steps.append([*row("s[{}]", after), ("y[0]", result)])
+        recorder.function = outer
         self._next += samples
-        return behind, mean
+        return recorder.inputs(f"r{number}[{{}}]", size), recorder.named([f"m{number}"])[0]
 
 
 class RecordedSensor(NamedTuple):
@@ -256,8 +278,6 @@ class RecordedRig(NamedTuple):
     recorder: Recorder
     sensors: list[RecordedSensor]
     """Those that the decisions depend on."""
-    settings: list[list[float]]
-    """The numbers of each axis that a model's <config> may change."""
     memory: list[str]
     """Names of what the decisions remember."""
     inputs: list[str]
@@ -288,22 +308,17 @@ def record(control: RigControl, plant: Plant) -> RecordedRig:
     parts = [*(sensor for axis in control.axes for sensor in axis.at_work), *control.between]
     if sum(len(part.draws) for part in parts) > len(control.draws):
         raise InputError("two sensors share a noise stream: a plugin draws each stream for one")
-    recorder = Recorder()
-    given = given_by(plant.model)
-    ideal = plant.ideal_readings(*([recorder.tape.input(name) for name in names] for names in given))
+    recorder = Recorder(control, plant)
     streams = {number: Stream(recorder, number, width) for number, width in control.draws.items()}
-    pairs = [_configured(recorder.tape, i, axis) for i, axis in enumerate(control.axes)]
-    control = replace(control, axes=tuple(axis for axis, _ in pairs))
     sensors = [
-        [_sensor(recorder, f"a{i}s{k}", sensor, own, streams) for k, sensor in enumerate(axis.at_work)]
-        for i, (axis, own) in enumerate(zip(control.axes, ideals_of(ideal), strict=True))
+        [_sensor(recorder, i, k, streams) for k in range(len(axis.at_work))] for i, axis in enumerate(control.axes)
     ]
-    memory = _decisions(recorder, control, sensors, ideal, streams)
+    memory = _decisions(recorder, sensors, streams)
     taken = recorder.used(["rig"])
     needed = [one for of_axis in sensors for one in of_axis if taken.intersection(one.delivered)]
     names = recorder.used(["rig", *(one.name for one in needed)])
-    inputs = [name for row in given for name in row if name in names]
-    return RecordedRig(recorder, needed, [values for _, values in pairs], memory, inputs)
+    inputs = [name for row in recorder.given for name in row if name in names]
+    return RecordedRig(recorder, needed, memory, inputs)
 
 
 def given_by(model: mujoco.MjModel) -> tuple[list[str], list[str]]:
@@ -325,64 +340,71 @@ def c_text(text: str) -> str:
     return f'"{"".join(letters)}"'
 
 
-def _configured(tape: Tape, number: int, axis: AxisControl) -> tuple[AxisControl, list[float]]:
-    """Return an axis with symbols as its settings, whose observer and law may remember symbols; and the settings."""
-    at_work, values = list(axis.at_work), []
-    for i, (part, kind, name) in enumerate(CONFIGURED):
-        stages: list[Any] = list(at_work[part].stages)
-        (place,) = (k for k, stage in enumerate(stages) if type(stage) is kind)
-        values.append(getattr(stages[place], name))
-        stages[place] = replace(stages[place], **{name: tape.input(f"setting {number} {i}")})
-        at_work[part] = replace(at_work[part], stages=tuple(stages))
+def settings_of(axis: AxisControl) -> list[float]:
+    """List the numbers of an axis that a model's <config> may change."""
+    stages = [(next(one for one in axis.at_work[k].stages if type(one) is kind), name) for k, kind, name in CONFIGURED]
+    return [getattr(stage, name) for stage, name in stages]
+
+
+def _configured(axis: AxisControl, symbols: Sequence[Symbol]) -> AxisControl:
+    """Return an axis with symbols as its settings, whose observer and law may remember symbols."""
+    at_work = list(axis.at_work)
+    for symbol, (k, kind, name) in zip(symbols, CONFIGURED, strict=True):
+        stages: list[Any] = [replace(one, **{name: symbol}) if type(one) is kind else one for one in at_work[k].stages]
+        at_work[k] = replace(at_work[k], stages=tuple(stages))
     observers, law = copy.deepcopy((axis.observers, axis.law))
-    return replace(axis, observers=observers, law=law, at_work=tuple(at_work)), values
+    return replace(axis, observers=observers, law=law, at_work=tuple(at_work))
 
 
-def _sensor(recorder: Recorder, name: str, sensor: Sensor, ideal: Any, streams: Mapping[int, Stream]) -> RecordedSensor:
+def _sensor(recorder: Recorder, axis: int, number: int, streams: Mapping[int, Stream]) -> RecordedSensor:
     """Record a sensor: its signal, its first sample, and a sample after others."""
-    signal = sensor.ideal(ideal)
+    name = f"a{axis}s{number}"
+
+    def begun() -> tuple[Sensor, IdealReading, list[Symbol]]:
+        control, readings = recorder.rig()
+        sensor, ideal = control.axes[axis].at_work[number], ideals_of(readings)[axis]
+        return sensor, ideal, recorder.inputs("x[{}]", len(sensor.ideal(ideal)))
+
     recorder.begin(f"{name}_ideal")
-    recorder.steps.append(row("y[{}]", signal))
+    sensor, ideal, x = begun()
+    recorder.function.steps.append(row("y[{}]", sensor.ideal(ideal)))
+    channels = len(x)
     recorder.begin(f"{name}_init")
-    memory, reading = sensor.started(recorder.inputs("x[{}]", len(signal)), ideal, streams)
+    sensor, ideal, x = begun()
+    memory, reading = sensor.started(x, ideal, streams)
     remembered = recorder.remembered(memory)
-    recorder.steps.append([*remembered, *row("y[{}]", reading)])
+    recorder.function.steps.append([*remembered, *row("y[{}]", reading)])
 
     def taken(before: Any, sample: int) -> tuple[Any, Row]:
-        x = recorder.inputs("x[{}]", len(signal))
+        sensor, ideal, x = begun()
         after, reading = sensor.passed(before, x, ideal, sample, streams)
         return after, row("y[{}]", reading)
 
     recorder.repeated(f"{name}_take", memory, [lambda before, n=n: taken(before, n) for n in (1, 2)])
     delivered = [f"delivered {name} {i}" for i in range(len(reading))]
-    return RecordedSensor(name, sensor, len(signal), [one for one, _ in remembered], delivered)
+    return RecordedSensor(name, sensor, channels, [one for one, _ in remembered], delivered)
 
 
 def _decisions(
-    recorder: Recorder,
-    control: RigControl,
-    sensors: Sequence[Sequence[RecordedSensor]],
-    readings: Readings,
-    streams: Mapping[int, Stream],
+    recorder: Recorder, sensors: Sequence[Sequence[RecordedSensor]], streams: Mapping[int, Stream]
 ) -> list[str]:
     """Record the first decision, one while a memory is trimmed, and a later one; return names of what they remember."""
 
-    def state(one: RecordedSensor) -> SensorState:
-        return SensorState(1, (), ([recorder.tape.input(name) for name in one.delivered],) * one.sensor.kept)
-
-    sampled = tuple(tuple(map(state, of_axis)) for of_axis in sensors)
-
     def decided(before: RigDeciding | None, tick: int) -> tuple[RigDeciding, Row]:
+        control, readings = recorder.rig()
+        rows = [[(one, recorder.named(one.delivered)) for one in of_axis] for of_axis in sensors]
+        sampled = [tuple(SensorState(1, (), (x,) * one.sensor.kept) for one, x in of_axis) for of_axis in rows]
         step = tick * control.period
-        axes, ticks = control.decide(sampled, before, step, readings)
+        axes, ticks = control.decide(tuple(sampled), before, step, readings)
         after, decision = control.drive(axes, before and before.between, step, ticks, readings, streams)
         return after, _shown(decision)
 
     recorder.begin("rig_first")
     memory, results = decided(None, 0)
     remembered = recorder.remembered(memory)
-    recorder.steps.append([*remembered, *results])
-    settled = max(1, math.ceil(max(axis.settled for axis in control.axes) / control.period))
+    recorder.function.steps.append([*remembered, *results])
+    axes = recorder.control.axes
+    settled = max(1, math.ceil(max(axis.settled for axis in axes) / axes[0].period))
     for name, ticks in (("rig_trimmed", (1, settled - 1)), ("rig_later", (settled, settled + 1))):
         if ticks[-1]:
             memory = recorder.repeated(name, memory, [lambda before, n=n: decided(before, n) for n in ticks])

@@ -28,6 +28,7 @@ from cmg_mj.features.plugin.recording import (
     c_text,
     generator,
     record,
+    settings_of,
 )
 from cmg_mj.plant.plant import Plant
 
@@ -204,7 +205,7 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
     inputs = locate("input", len(recorded.inputs))
     rows, modules = [], []
     for i, (axis, control) in enumerate(zip(rig.plant.axes, controls, strict=True)):
-        gimbals, settings = len(axis.modules), recorded.settings[i]
+        gimbals, settings = len(axis.modules), settings_of(control)
         numbers = control.law.rate_limit, control.sensors.accelerometer.raw_rate_hz, _struct(settings)
         counts = {"servo": gimbals, "motor": gimbals, "show": len(QUANTITIES), "setting": len(settings)}
         places = [locate(f"{name} {i}", count) for name, count in counts.items()]

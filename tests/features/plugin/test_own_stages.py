@@ -86,7 +86,10 @@ def test_stages_of_ones_own_without_a_line_of_c(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize(
     ("effect", "words"),
-    [(Counting(), "depends on the number of the sample"), (Hoarding(), "remembers a number elsewhere")],
+    [
+        (Counting(), "depends on the number of the sample"),
+        (Hoarding(), r"remembered from an earlier recording \(.*test_own_stages"),
+    ],
 )
 def test_a_stage_that_is_no_formula_is_refused(
     effect: SensorStage, words: str, monkeypatch: pytest.MonkeyPatch
