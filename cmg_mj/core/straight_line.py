@@ -50,7 +50,7 @@ PYTHON = {
 """NumPy's function -> Python on floats, which rounds as `arrays` does on them; `math` rounds `hypot` otherwise."""
 ON_ARRAYS = {
     **PYTHON,
-    **{name: f"{name}({{0}})" for name in ("sqrt", "exp", "sin", "cos", "sign", "rint", "isfinite")},
+    **{name: f"{name}({{0}})" for name in ("sqrt", "exp", "sin", "cos", "sign", "rint")},
     **{name: f"{name}({{0}}, {{1}})" for name in ("copysign", "float_power", "maximum", "minimum")},
     "power": "float_power({0}, {1})",
     "arctan2": "atan2({0}, {1})",
@@ -64,7 +64,7 @@ ON_ARRAYS = {
 }
 """NumPy's function -> Python on arrays; what rounds otherwise than the C library is `arrays`' own."""
 CALLED_ON_ARRAYS = {
-    **{name: getattr(np, name) for name in ("sqrt", "sin", "cos", "sign", "rint", "isfinite", "where")},
+    **{name: getattr(np, name) for name in ("sqrt", "sin", "cos", "sign", "rint", "where")},
     **{name: getattr(np, name) for name in ("copysign", "float_power", "maximum", "minimum")},
     "exp": arrays.exp,
     "atan2": arrays.atan2,

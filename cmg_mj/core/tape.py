@@ -32,7 +32,7 @@ RECORDED = frozenset(
     absolute fabs add subtract multiply divide negative sign maximum minimum power float_power copysign
     sqrt exp expm1 log log1p sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 hypot floor ceil rint fmod
     less less_equal greater greater_equal equal not_equal
-    logical_and logical_or logical_not bitwise_and bitwise_or invert isfinite
+    logical_and logical_or logical_not bitwise_and bitwise_or invert
     """.split()  # noqa: SIM905
 )
 """NumPy's functions that a tape takes, beside `where`, `clip`, `square` and `positive`."""
@@ -155,6 +155,11 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
 
     def __repr__(self) -> str:
         return f"Symbol({self.place})"
+
+    @property
+    def is_array(self) -> bool:
+        """See `Symbolic`."""
+        return self.tape.worlds is not None
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
         if method != "__call__" or kwargs:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.bend import Bend, BendBeyond
-from cmg_mj.features.bend.edit import STEP_SHARE
+from cmg_mj.features.bend import STEP_SHARE, Bend, BendBeyond
 from cmg_mj.features.bend.verdict import rk4_energy_loss
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant

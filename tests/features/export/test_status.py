@@ -109,9 +109,9 @@ def test_a_number_of_the_controller_that_is_not_finite_stops_it(
 ) -> None:
     """As a cosmic ray, or an observer that diverges: whatever member it is, unless it is not read again."""
     compiled, readings = Compiled(kind, "double", tmp_path, *law), samples(kind, "double")
-    code = pipeline.generate_code(control(kind, *law), "double")
-    stateless = code.figures["numbers_in_state"] == 0  # then the first number is a place that nothing uses
-    members = stateless + code.figures["numbers_in_state"] + len(code.law.law.state) + 2
+    traced, _, _ = pipeline._traced(control(kind, *law))
+    stateless = not traced.state  # then the first number is a place that nothing uses
+    members = stateless + len(traced.state) + len(traced.law.state) + 2
     seen = 0
     for member in range(stateless, members):
         compiled.statuses(readings[:30])
