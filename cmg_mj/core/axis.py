@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol
 
-
 from cmg_mj.core.arrays import Scalar, clip, where
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.failures import check_estimate, check_shape, is_trusted, stop, stop_not_finite

@@ -20,6 +20,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from tests.features.plugin.made import assert_same_run, needs_compiler
+from tests.recorded import recorded
 
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
 
@@ -141,9 +142,7 @@ def short(*settings: str) -> Experiment:
 
 
 def trajectory(experiment: Experiment) -> Trajectory:
-    result = experiment.run()
-    assert result.trajectory is not None
-    return result.trajectory
+    return recorded(experiment.run())
 
 
 def test_a_stiff_frame_moves_as_a_rigid_one() -> None:

@@ -22,6 +22,7 @@ from cmg_mj.features.gymnasium import ID, READINGS, STATE_COST, ScissoredPairEnv
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import ROOT, environment
+from tests.recorded import recorded
 
 SHORT = ["duration_s=3.0", "push.0.start_s=0.5"]
 REAL = [
@@ -73,8 +74,7 @@ def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: li
     env = ScissoredPairEnv(scenario, settings, in_rad_s=True)
     ticks, infos, _ = act(env, seed, world=world)
     result = prepare(load_scenario(scenario, [*settings, f"seed={seed}"])).run(world=world)
-    trajectory = result.trajectory
-    assert trajectory is not None
+    trajectory = recorded(result)
     assert len(ticks) == len(trajectory)
     for name, field in (("y1_rad", "y1"), ("y2_rad", "y2"), ("u_rad_s", "u"), ("fog_rad_s", "fog")):
         assert [getattr(tick, field) for tick in ticks] == trajectory[name].tolist(), name

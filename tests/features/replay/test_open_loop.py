@@ -9,10 +9,10 @@ import pytest
 
 from cmg_mj.features.replay import replay
 from cmg_mj.observers import OBSERVERS
-from cmg_mj.results.result import Result
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
+from tests.recorded import recorded
 
 SETTINGS = ["duration_s=0.8", "push.0.start_s=0.3", 'open_loop_observers="all"', 'controller.feedback="fog"']
 
@@ -24,9 +24,7 @@ def experiment() -> Experiment:
 
 @cache
 def record(worlds: int | None) -> Trajectory:
-    result: Result = experiment().run() if worlds is None else experiment().run_many(worlds)
-    assert result.trajectory is not None
-    return result.trajectory
+    return recorded(experiment().run() if worlds is None else experiment().run_many(worlds))
 
 
 @pytest.mark.parametrize("worlds", [None, 3])

@@ -12,6 +12,7 @@ from cmg_mj import load_scenario, prepare
 from cmg_mj.features.studio.panel import ChangeSettings, PushRequest
 from cmg_mj.features.studio.settings import NOISE
 from tests.features.studio.session import as_rows, session
+from tests.recorded import recorded
 
 RATE, PUSH = 1, 7
 """Columns of a row."""
@@ -19,9 +20,7 @@ RATE, PUSH = 1, 7
 
 @cache
 def runner_rows(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
-    trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
-    assert trajectory is not None
-    return as_rows(trajectory)
+    return as_rows(recorded(prepare(load_scenario(scenario, list(settings))).run()))
 
 
 def same(rows: np.ndarray, expected: np.ndarray) -> None:
