@@ -247,7 +247,7 @@ class Stream:
         words = f"{generator(self._number)}, {self._width}, {looping}, r{number}, {samples}, {piece}"
         outer.steps.append(f"double r{number}[{size}];")
         outer.write(row(f"r{number}[{{}}]", memory))
-        outer.steps.append(f"const double m{number} = noise_mean(s + {words});")
+        outer.steps.append(f"const double m{number} = noise_mean(s + {words}); (void)m{number};")
         recorder.begin(looping)
         after, result = formula(recorder.inputs("s[{}]", size), recorder.inputs("x[{}]", self._width))
         recorder.function.write([*row("s[{}]", after), ("y[0]", result)])

@@ -36,9 +36,8 @@ SHOWN = 5
 """Numbers that are shown of an axis before its estimate."""
 NOISE_WORDS = 8
 """Numbers of a noise stream's generator."""
-
-
 BUILD = "@BUILD@"
+"""Stands for the code's fingerprint until that is known."""
 
 
 class PluginRig(NamedTuple):
