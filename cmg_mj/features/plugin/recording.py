@@ -26,6 +26,8 @@ from cmg_mj.stages.pair import White
 
 OF_STAGES = (Symbolic, *FLOATS)
 """Numbers of a stage's memory; its whole numbers count samples, by which it looks up noise."""
+HEAD = 10
+"""Numbers at the state's beginning, which rig.h names."""
 CONFIGURED = (0, White, "sigma"), (0, Digital, "resolution"), (1, Digital, "resolution")
 """Numbers of an axis that a model's <config> may change: the sensor, its stage, the stage's field."""
 
@@ -40,28 +42,18 @@ class Function(NamedTuple):
     """What it has before the first `_` it has in common with the functions of the same part."""
     tape: Tape
     """Its operations."""
-    steps: list[str | Row]
-    """Lines, and numbers that it writes."""
+    steps: list[str | tuple[list[str], list[int]]]
+    """Lines; and names of numbers that it writes, with their places on the tape."""
 
-    def rows(self) -> list[tuple[list[str], Formula]]:
-        """List the formulas of what it writes, each with the names of the results."""
-        formulas = []
-        for step in self.steps:
-            if not isinstance(step, str):
-                places = [self.tape.place(number) for _, number in step]
-                needed = sorted(self.tape.needed(places))
-                given = [place for place in needed if self.tape.operations[place].name == INPUT]
-                formulas.append(([name for name, _ in step], Formula(self.tape, given, places)))
-        return formulas
+    def write(self, numbers: Row) -> None:
+        """Append numbers that are written at once."""
+        self.steps.append(([name for name, _ in numbers], [self.tape.place(number) for _, number in numbers]))
 
-    def inputs(self, formula: Formula) -> list[str]:
-        """Name the given numbers of a formula."""
-        return [self.tape.operations[place].value for place in formula.inputs]
-
-    @property
-    def part(self) -> str:
-        """Name of the part."""
-        return _part(self.name)
+    def given(self, places: Sequence[int]) -> dict[int, str]:
+        """Find the given numbers that others depend on: place -> name."""
+        operations = self.tape.operations
+        needed = sorted(self.tape.needed(places))
+        return {place: operations[place].value for place in needed if operations[place].name == INPUT}
 
 
 class Recorder:
@@ -126,10 +118,8 @@ class Recorder:
             after, results = run(_rebuilt(tree, iter(before)))
             if form(after) != form(tree):
                 raise InputError(f"{name}: its memory changes its form")
-            self.function.steps.append([*self.remembered(after), *results])
-            lines = [step for step in self.function.steps if isinstance(step, str)]
-            formulas = [(names, formula.outputs) for names, formula in self.function.rows()]
-            recorded.append((lines, formulas, self.function.tape.operations))
+            self.function.write([*self.remembered(after), *results])
+            recorded.append((self.function.steps, self.function.tape.operations))
             tree = after
         if any(one != recorded[0] for one in recorded):
             raise InputError(f"{name}: depends on the number of the sample or the step otherwise than by its noise")
@@ -137,35 +127,42 @@ class Recorder:
 
     def remembered(self, tree: Any) -> Row:
         """List the numbers of a memory of the function that is recorded, with their names."""
-        return row(f"{self.function.part} {{}}", _leaves(tree))
+        return row(f"{_part(self.function.name)} {{}}", _leaves(tree))
+
+    def of(self, parts: Collection[str]) -> list[Function]:
+        """List the functions of some parts."""
+        return [function for name, function in self.functions.items() if _part(name) in parts]
 
     def used(self, parts: Collection[str]) -> set[str]:
         """Find the names of the numbers that the functions of some parts take."""
-        functions = [function for function in self.functions.values() if function.part in parts]
-        return {name for one in functions for _, formula in one.rows() for name in one.inputs(formula)}
+        written = [(one, step[1]) for one in self.of(parts) for step in one.steps if not isinstance(step, str)]
+        return {name for function, places in written for name in function.given(places).values()}
 
-    def locate(self, names: Sequence[str], first: int) -> int:
-        """Give names the next places; the state's first one is given. Return the first of them."""
-        first += len(self.places)
+    def locate(self, names: Sequence[str]) -> int:
+        """Give names the next places in the state; return the first of them."""
+        first = HEAD + len(self.places)
         self.places |= {name: first + i for i, name in enumerate(names)}
         return first
 
     def printed(self, parts: Collection[str]) -> str:
         """Print the functions of some parts in C."""
-        functions = [function for function in self.functions.values() if function.part in parts]
-        text = f"static formula {', '.join(function.name for function in functions)};\n\n"
-        for function in functions:
-            blocks = [
-                ["{", *body(formula, *map(self._texts, (function.inputs(formula), names)), "double", "double"), "}"]
-                for names, formula in function.rows()
-            ]
-            rows = iter(blocks)
-            lines = [line for step in function.steps for line in ([step] if isinstance(step, str) else next(rows))]
-            inside = "".join(f"    {line}\n" for line in ["(void)s, (void)x, (void)y;", *lines])
+        text = f"static formula {', '.join(function.name for function in self.of(parts))};\n\n"
+        for function in self.of(parts):
+            lines = ["(void)s, (void)x, (void)y;"]
+            for step in function.steps:
+                if isinstance(step, str):
+                    lines.append(step)
+                    continue
+                names, places = step
+                given = function.given(places)
+                formula = Formula(function.tape, list(given), places)
+                inputs, outputs = self._texts(given.values()), self._texts(names)
+                lines += ["{", *body(formula, inputs, outputs, "double", "double"), "}"]
+            inside = "".join(f"    {line}\n" for line in lines)
             text += f"static void {function.name}(double *s, const double *x, double *y)\n{{\n{inside}}}\n\n"
         return text
 
-    def _texts(self, names: Sequence[str]) -> list[str]:
+    def _texts(self, names: Iterable[str]) -> list[str]:
         return [f"s[{self.places[name]}]" if name in self.places else name for name in names]
 
 
@@ -202,7 +199,7 @@ class Stream:
     def __init__(self, recorder: Recorder, number: int, width: int) -> None:
         self._recorder, self._number, self._width = recorder, number, width
         self._next = 0
-        self._steps: list[str | Row] = []
+        self._function: Function | None = None
         self._drawn: Sequence[Symbol] = ()
 
     def __call__(self, sample: int) -> Sequence[Symbol]:
@@ -211,15 +208,15 @@ class Stream:
         Raises:
             InputError: It is neither the next one nor the last one of the same function.
         """
-        steps = self._recorder.function.steps
+        function = self._recorder.function
         if sample == self._next:
-            drawn = f"d{len(steps)}"
-            steps.append(f"double {drawn}[{self._width}];")
-            steps.append(f"noise_normals(s + {generator(self._number)}, {drawn}, {self._width});")
+            drawn = f"d{len(function.steps)}"
+            words = f"s + {generator(self._number)}, {drawn}, {self._width}"
+            function.steps.append(f"double {drawn}[{self._width}]; noise_normals({words});")
             self._drawn = self._recorder.inputs(f"{drawn}[{{}}]", self._width)
-            self._steps = steps
+            self._function = function
             self._next += 1
-        elif sample != self._next - 1 or steps is not self._steps:
+        elif sample != self._next - 1 or function is not self._function:
             raise InputError(
                 f"noise stream {self._number}: sample {sample} is looked up, and {self._next} is next: a plugin draws "
                 "one after the other"
@@ -249,11 +246,11 @@ class Stream:
         looping = f"{outer.name}_{number}"
         words = f"{generator(self._number)}, {self._width}, {looping}, r{number}, {samples}, {piece}"
         outer.steps.append(f"double r{number}[{size}];")
-        outer.steps.append(row(f"r{number}[{{}}]", memory))
-        outer.steps.append(f"const double m{number} = noise_mean(s + {words});")
+        outer.write(row(f"r{number}[{{}}]", memory))
+        outer.steps.append(f"const double m{number} = noise_mean(s + {words}); (void)m{number};")
         recorder.begin(looping)
         after, result = formula(recorder.inputs("s[{}]", size), recorder.inputs("x[{}]", self._width))
-        recorder.function.steps.append([*row("s[{}]", after), ("y[0]", result)])
+        recorder.function.write([*row("s[{}]", after), ("y[0]", result)])
         recorder.function = outer
         self._next += samples
         return recorder.inputs(f"r{number}[{{}}]", size), recorder.named([f"m{number}"])[0]
@@ -367,13 +364,13 @@ def _sensor(recorder: Recorder, axis: int, number: int, streams: Mapping[int, St
 
     recorder.begin(f"{name}_ideal")
     sensor, ideal, x = begun()
-    recorder.function.steps.append(row("y[{}]", sensor.ideal(ideal)))
+    recorder.function.write(row("y[{}]", sensor.ideal(ideal)))
     channels = len(x)
     recorder.begin(f"{name}_init")
     sensor, ideal, x = begun()
     memory, reading = sensor.started(x, ideal, streams)
     remembered = recorder.remembered(memory)
-    recorder.function.steps.append([*remembered, *row("y[{}]", reading)])
+    recorder.function.write([*remembered, *row("y[{}]", reading)])
 
     def taken(before: Any, sample: int) -> tuple[Any, Row]:
         sensor, ideal, x = begun()
@@ -402,7 +399,7 @@ def _decisions(
     recorder.begin("rig_first")
     memory, results = decided(None, 0)
     remembered = recorder.remembered(memory)
-    recorder.function.steps.append([*remembered, *results])
+    recorder.function.write([*remembered, *results])
     axes = recorder.control.axes
     settled = max(1, math.ceil(max(axis.settled for axis in axes) / axes[0].period))
     for name, ticks in (("rig_trimmed", (1, settled - 1)), ("rig_later", (settled, settled + 1))):

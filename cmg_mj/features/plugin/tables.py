@@ -32,12 +32,12 @@ from cmg_mj.features.plugin.recording import (
 )
 from cmg_mj.plant.plant import Plant
 
-HEAD = 10
-"""Numbers at the state's beginning."""
 SHOWN = 5
 """Numbers that are shown of an axis before its estimate."""
 NOISE_WORDS = 8
 """Numbers of a noise stream's generator."""
+BUILD = "@BUILD@"
+"""Stands for the code's fingerprint until that is known."""
 
 
 class PluginRig(NamedTuple):
@@ -176,31 +176,29 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
     check_noise(rig.seed, rig.world)
     recorded = record(rig.control, rig.plant)
     files = common_files()
-    files["rig.c"] = format_rig(rig, recorded, "")
+    files["rig.c"] = format_rig(rig, recorded)
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
-    files["rig.c"] = format_rig(rig, recorded, build)
+    files["rig.c"] = files["rig.c"].replace(BUILD, build)
     sources = [*COMMON_SOURCES, "rig.c"]
     prefix = rig.plant.axes[0].prefix
     return PluginCode(name, files | extra_files(name, files, sources, prefix), sources, build)
 
 
-def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
+def format_rig(rig: PluginRig, recorded: RecordedRig) -> str:
     """Print rig.c: the recorded functions, and the rig's tables.
 
     Args:
         rig: The rig.
         recorded: Its functions.
-        build: Fingerprint of the code.
 
     Returns:
-        The text.
+        The text, with `BUILD` where the code's fingerprint belongs.
     """
     controls, sensors, recorder = rig.control.axes, recorded.sensors, recorded.recorder
     steps = math.gcd(rig.control.period, *(one.sensor.steps_per_sample for one in sensors))
-    recorder.places.clear()
 
     def locate(name: str, count: int) -> int:
-        return recorder.locate([f"{name} {i}" for i in range(count)], HEAD)
+        return recorder.locate([f"{name} {i}" for i in range(count)])
 
     inputs = locate("input", len(recorded.inputs))
     rows, modules = [], []
@@ -213,12 +211,12 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
         rows.append([c_text(axis.prefix), gimbals, _estimates(control), own, *numbers, *places])
         modules += [_struct([c_text(one.name), one.direction, one.speed, one.gimbal_zero]) for one in axis.modules]
     held, rate = locate("held", len(controls)), locate("rate", len(controls))
-    taken = recorder.locate(recorded.inputs, HEAD)
+    taken = recorder.locate(recorded.inputs)
     rows_of_sensors = [_describe_sensor(one, steps, recorder) for one in sensors]
     shown = [locate(f"shown {i}", SHOWN + _estimates(control)) for i, control in enumerate(controls)]
-    memory = recorder.locate(recorded.memory, HEAD)
+    memory = recorder.locate(recorded.memory)
     draws = all_draws([*(one.sensor for one in sensors), *rig.control.between])
-    noise = recorder.locate([], HEAD)
+    noise = recorder.locate([])
     generators = [f"{generator(stream)} = {locate(generator(stream), NOISE_WORDS)}" for stream in draws]
     tables = {
         "axis_type axes": [_struct([*row, place]) for row, place in zip(rows, shown, strict=True)],
@@ -229,9 +227,9 @@ def format_rig(rig: PluginRig, recorded: RecordedRig, build: str) -> str:
     settled = -(-max(axis.settled for axis in controls) // steps)
     trimmed = "rig_trimmed" if "rig_trimmed" in recorder.functions else "rig_later"
     numbers = [
-        *(c_text(rig.plugin), c_text(build), rig.seed, rig.world, steps * controls[0].timestep),
+        *(c_text(rig.plugin), c_text(BUILD), float(rig.seed), float(rig.world), steps * controls[0].timestep),
         *(rig.control.period // steps, settled, *map(len, tables.values())),
-        *(inputs, held, rate, taken, shown[0], memory, noise, recorder.locate([], HEAD)),
+        *(inputs, held, rate, taken, shown[0], memory, noise, recorder.locate([])),
         *("axes", "sensors", "inputs", "streams", "rig_first", trimmed, "rig_later"),
     ]
     printed = "".join(
@@ -264,14 +262,14 @@ def _estimates(control: AxisControl) -> int:
 def _describe_sensor(one: RecordedSensor, steps: int, recorder: Recorder) -> str:
     """Print a `sensor_type`, its times in instants of so many physics steps, and locate its numbers."""
     sensor, width = one.sensor, len(one.delivered)
-    recorder.locate(one.memory, HEAD)
-    delivered = recorder.locate(one.delivered, HEAD)
+    recorder.locate(one.memory)
+    delivered = recorder.locate(one.delivered)
     on_the_way = [f"reading {one.name} {i}" for i in range(sensor.kept * width if sensor.latency else 0)]
     older = [f"older {one.name} {i}" for i in range(sensor.older_kept * one.channels)]
     numbers = [
         *(one.channels, width, sensor.period // steps, sensor.raw // steps, sensor.skew // steps),
         *(-(-sensor.latency // steps), sensor.settle, sensor.kept, sensor.older_kept),
-        *(recorder.locate(on_the_way, HEAD) if on_the_way else delivered, recorder.locate(older, HEAD), delivered),
+        *(recorder.locate(on_the_way) if on_the_way else delivered, recorder.locate(older), delivered),
     ]
     functions = [f"{one.name}_{part}" for part in ("ideal", "init", "take")]
     return _struct([*numbers, *functions])

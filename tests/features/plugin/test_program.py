@@ -127,7 +127,7 @@ def test_the_readmes_observer_without_python(readmes_observer: str, tmp_path: Pa
     ],
 )
 def test_sanitizers(scenario: str, settings: tuple[str, ...], tmp_path: Path) -> None:
-    made = make("gyro_free", *settings, "push=[]", scenario=scenario)
+    made = make("mems_fused", *settings, "push=[]", scenario=scenario)
     rows, _ = run_program(made.plugin.model, *compile_strictly(made, tmp_path, *SANITIZERS), 2000, 20)
     np.testing.assert_array_equal(rows, expected(made, 2000))
 
