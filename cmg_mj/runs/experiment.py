@@ -84,6 +84,13 @@ class ExperimentAxis:
         """The observer in the loop, then the open-loop observers."""
         return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
 
+    def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
+        """Make the closed loop of this axis a linear system: see `Experiment.linear_closed_loop`."""
+        from cmg_mj.linear.loop import linear_closed_loop  # no run needs it
+
+        with self.scenario.named_in_errors():
+            return linear_closed_loop(self.design, self.plant, plant)
+
     @property
     def hints(self) -> list[str]:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
@@ -454,11 +461,7 @@ class Experiment:
         Raises:
             InputError: Something in the loop is not linear, or not covered; the message names it.
         """
-        from cmg_mj.linear.loop import linear_closed_loop  # no run needs it
-
-        part = self.require_single_axis("linear_closed_loop")
-        with part.scenario.named_in_errors():
-            return linear_closed_loop(part.design, part.plant, plant)
+        return self.require_single_axis("linear_closed_loop").linear_closed_loop(plant)
 
     @property
     def hints(self) -> list[str]:
