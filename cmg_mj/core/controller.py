@@ -10,13 +10,13 @@ from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Delivered, Sampled, Tick
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.noise import Normals
-from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding, ideals_of
+from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding
 from cmg_mj.core.straight_line import Tables, straight_line
 from cmg_mj.core.types import Forces, Law, Observer, Setpoints
 
 _new = tuple.__new__
 
-PRINTED_AFTER = 64
+PRINTED_AFTER = 32
 """Control ticks after which a run goes on as straight-line Python: a shorter one would not win back its printing."""
 MAX_PHASES = 40
 """Instants of a common period beyond which nothing is printed: each has lines of its own."""
@@ -136,10 +136,6 @@ class Controller:
         """Actuators that are moved beside the gimbals, and their controls since the last tick."""
         decision = self.state.decision
         return list(self.rig.actuators), () if decision is None else decision.setpoints
-
-    def body_rate(self, axis: int) -> Scalar:
-        """Return the rate of an axis' frame at the last update, as a perfect gyro along its line shows it [rad/s]."""
-        return ideals_of(self.state.readings)[axis].gyro
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
