@@ -13,12 +13,14 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar, cos, sin
 from cmg_mj.core.axis import AxisControl, Deciding, KnownPlant, Sampled
 from cmg_mj.core.errors import InputError, nearest, shortened
+from cmg_mj.core.reduced_model import ReducedModel
 from cmg_mj.core.rig import RigControl
 from cmg_mj.core.sensor import Digital, Sensor
 from cmg_mj.core.tilt import GimbalAngle, PairTilt
-from cmg_mj.core.types import STATE_SIGNALS, Estimate, Forces, IdealReading, Measurement, State
+from cmg_mj.core.types import STATE_SIGNALS, Forces, IdealReading, Measurement
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
 from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes, slopes_at
+from cmg_mj.observers.linear import FiniteDifference
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
 
@@ -40,8 +42,6 @@ TAKES = (
 """The package's observers that have a slope at rest."""
 SENSORS = ("accelerometer", "encoder", "fog", "mems_gyro")
 """Sections of the sensors, in the order in which an axis has them."""
-HELD = "held"
-"""The command before, a field of `Deciding`."""
 MOTION = 6
 """The number of the plant's outputs."""
 LENGTH = 1e-5
@@ -118,7 +118,7 @@ class ClosedLoop:
         self._plant = plant
         self._true_state = true_state
         axis = _control(design)
-        self._axis = _fed_the_true_state(axis) if true_state else axis
+        self._axis = _fed_the_true_state(axis, design.rig.reduced) if true_state else axis
         rig = RigControl((self._axis,))
         self.interval = rig.steps_per_sample
         self._steps = range(0, rig.common_period, self.interval)
@@ -130,7 +130,7 @@ class ClosedLoop:
         self._hold = plant.hold(self.interval * axis.timestep)
         self._averaged = design.scenario.sensors.accelerometer.averaged and not true_state
         self._gravity = design.rig.gravity
-        self._tilt = _true_tilt(design)
+        self._tilt = design.rig.tilt if true_state else _true_tilt(design)
         zero = 0.0 if worlds is None else np.zeros(worlds)
         self._rest = self.start(*[zero] * MOTION)
         self._still = self._shown(0, self._rest)
@@ -153,27 +153,29 @@ class ClosedLoop:
         sizes = [len(part.A) for part in (self._plant, sensed[0], decided)]
         n = sum(sizes)
         x, sampled, deciding, inputs = np.split(np.eye(n + len(self.inputs)), np.cumsum(sizes))
-        push = inputs[0]
-        rates = iter(inputs[len(INPUTS) - 1 :])
-        turned = deciding[decided.paths.index((HELD,))]
+        (push,), noise, beside = np.split(inputs, [1, 1 + len(MEASURED)])
+        rates = iter(beside)
+        turned = deciding[decided.paths.index(("held",))]
         outputs: list[np.ndarray] = []
         for part in sensed:
             motion = self.motion(x, turned, push)
             shown = part.C @ sampled + part.D @ motion
             sampled = part.A @ sampled + part.B @ motion
             if len(shown):
-                shown[: len(MEASURED)] += inputs[1 : len(INPUTS) - 1]
+                shown[: len(noise)] += noise
                 u, *estimate = decided.C @ deciding + decided.D @ shown
                 deciding = decided.A @ deciding + decided.B @ shown
-                outputs += [u] if outputs else [*motion[:3], u, *estimate[: len(self._estimates)]]
                 turned = u + next(rates)
+                outputs += [u] if outputs else [*motion[:3], u, *estimate[: len(self._estimates)]]
             x = self.moved(x, turned, push)
         J = np.array([*x, *sampled, *deciding, *outputs])
         A, B, C, D = J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:]
         kept = needed_states(A, C) & needed_states(A.T, B.T)
-        states = np.array([*self._plant.names, *_names(sensed[0]), *_names(decided)], dtype=object)
-        names = [*OUTPUTS, *(f"estimated_{name}" for name in self._estimates)]
-        names += [f"u_rad_s_{i}" for i in range(1, self.ticks)]
+        sampling = ["_".join([SENSORS[int(number)], *path]) for number, *path in sensed[0].paths]
+        controlling = ["_".join(path).replace("observers_0", "observer") for path in decided.paths]
+        states = np.array([*self._plant.names, *sampling, *controlling], dtype=object)
+        commands = [f"u_rad_s_{i}" for i in range(1, self.ticks)]
+        names = [*OUTPUTS, *(f"estimated_{name}" for name in self._estimates), *commands]
         return A[kept][:, kept], B[kept], C[:, kept], D, states[kept].tolist(), names
 
     def start(self, *motion: Scalar) -> Sampled:
@@ -255,9 +257,7 @@ class ClosedLoop:
         self, x1: Scalar, x2: Scalar, x3: Scalar, y1: Scalar, acceleration: Scalar, gyro: Scalar
     ) -> IdealReading:
         """Return what perfect sensors show of the plant's outputs."""
-        forces: Forces = [x1, x2]
-        if not self._true_state:
-            forces = self._tilt.forces(-self._gravity * sin(y1), self._gravity * cos(y1), acceleration)
+        forces: Forces = self._tilt.forces(-self._gravity * sin(y1), self._gravity * cos(y1), acceleration)
         if self._is_array:
             forces = np.array(forces)
         places = self._places(y1, gyro) if self._averaged else ()
@@ -266,32 +266,12 @@ class ClosedLoop:
     def _places(self, tilt: Scalar, rate: Scalar) -> list[Scalar]:
         """Return `IdealReading.motion` about a pivot at rest."""
         shown = []
-        zero, s, c = 0.0 * tilt, sin(tilt), cos(tilt)
+        upright = np.exp(-1j * tilt)  # of a vector across + i up, turned with the tilt
         for (r, across), angle in zip(self._tilt.places, self._tilt.angles, strict=True):
-            velocity = rate * (r * c - across * s), zero, -rate * (r * s + across * c)
-            turned = sin(tilt - angle), cos(tilt - angle)
-            shown += [*velocity, turned[1], zero, -turned[0], turned[0], zero, turned[1]]
+            velocity = -1j * rate * (across + 1j * r) * upright
+            own = np.exp(1j * angle) * upright
+            shown += [part for vector in (velocity, own, 1j * own) for part in (vector.real, 0.0, vector.imag)]
         return [*shown, self._gravity]
-
-
-class _TrueState:
-    """The accelerometers' tilt and the observer of a loop whose accelerometers show tilt and rate."""
-
-    def __call__(self, tilt: Scalar, rate: Scalar) -> Scalar:
-        """Return the tilt."""
-        return tilt
-
-    def acceleration(self, tilt: Scalar, rate: Scalar) -> Scalar:
-        """Return the rate."""
-        return rate
-
-    def init(self, y: Measurement) -> State:
-        """Return no state."""
-        return ()
-
-    def step(self, state: State, y: Measurement, u: Scalar) -> tuple[State, Sequence[Scalar]]:
-        """Hand on what is shown."""
-        return state, Estimate(y.y1, y.acceleration, y.y2)
 
 
 def _control(design: Design) -> AxisControl:
@@ -314,13 +294,17 @@ def _unrounded(sensor: Sensor) -> Sensor:
     return replace(sensor, stages=tuple(stages))
 
 
-def _fed_the_true_state(axis: AxisControl) -> AxisControl:
-    """Let the accelerometers show tilt and rate, at their times, and an observer hand both on."""
-    pair, *others = axis.at_work[:3]
-    shows: Any = _TrueState()
+def _fed_the_true_state(axis: AxisControl, model: ReducedModel) -> AxisControl:
+    """Take perfect accelerometers, and for the observer's rate that of a perfect gyro with their times."""
+    pair, encoder, fog, *_ = axis.at_work
     perfect = Sensor("accelerations", (), pair.period, pair.latency)
-    plant = axis.plant._replace(tilt=shows)
-    return replace(axis, observers=(shows,), plant=plant, at_work=(perfect, *others), memories=())
+    feedback = axis.feedback
+    if feedback == "observer":
+        feedback = "fog"
+        fog = replace(perfect, signal="gyro")
+    unused = FiniteDifference(axis.law.dt, model)
+    at_work = perfect, encoder, fog
+    return replace(axis, observers=(unused,), at_work=at_work, memories=(), feedback=feedback, angle_source="measured")
 
 
 def _true_tilt(design: Design) -> PairTilt:
@@ -335,15 +319,3 @@ def _silence(width: int, worlds: int | None) -> Callable[[int], Any]:
     """Return a table of noise that is zero."""
     zeros = [0.0] * width if worlds is None else np.zeros((width, worlds))
     return lambda sample: zeros
-
-
-def _names(part: Slopes) -> list[str]:
-    """Name the states of sensors or of a decision by their paths."""
-    names = []
-    for owner, *path in part.paths:
-        if owner.isdecimal():
-            owner = SENSORS[int(owner)]
-        if owner == "observers":
-            owner, path = "observer", path[1:]
-        names.append("_".join(["u_before" if owner == HELD else owner, *path]))
-    return names
