@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from cmg_mj.core.errors import TomlValue
 from cmg_mj.core.tilt import PairTilt
@@ -23,14 +24,35 @@ from cmg_mj.scenario.schema import ControllerSettings
 
 OWN_CODE = "your own code, which was imported and tried on two samples"
 
+Rows = list[tuple[str, Any]]
 
-def description(name: str, part: ExperimentAxis) -> str:
+
+def description(name: str, axes: Sequence[ExperimentAxis]) -> str:
     """Describe a scenario in the lines that `cmg-mj check` prints.
 
     Args:
         name: The scenario as the user called it.
-        part: One axis of it.
+        axes: Its axes.
     """
+    titles = [f"{name}{f', axis {part.name}' if part.name else ''}: valid" for part in axes]
+    groups = [[_own_rows(part), *_shareable_rows(part)] for part in axes]
+    return _blocks(titles, groups, f"{name}, on all axes")
+
+
+def _blocks(titles: Sequence[str], groups: Sequence[Sequence[Rows]], shared_title: str) -> str:
+    """Join a block an axis and, of several axes, one with the groups of rows that all of them have."""
+    shared = [group for group in groups[0] if all(group in others for others in groups)] if len(groups) > 1 else []
+    blocks = [
+        lines(title, [row for group in own if group not in shared for row in group])
+        for title, own in zip(titles, groups, strict=True)
+    ]
+    if shared:
+        blocks.append(lines(shared_title, [row for group in shared for row in group]))
+    return "\n".join(blocks)
+
+
+def _own_rows(part: ExperimentAxis) -> Rows:
+    """Describe the plant about an axis, its law, observers and sensors."""
     scenario, design, rig, axis = part.scenario, part.design, part.design.rig, part.plant.axis.name
     settings = scenario.plant
     timestep = rig.timestep
@@ -43,9 +65,7 @@ def description(name: str, part: ExperimentAxis) -> str:
     compare = scenario.compare
     rates = {kind: getattr(scenario.sensors, kind).rate_hz for kind in ("accelerometer", "encoder", "fog")}
     imperfections = scenario.sensors.accelerometer.imperfections
-    missing = list(omissions(scenario).values())
-    judgements = [judge(design, part.plant) for judge in entries("judge").values()]
-    rows = [
+    return [
         ("run", f"{scenario.duration_s:g} s, {steps} ({settings.integrator}{coarse}), seed {scenario.seed}"),
         ("plant", f"{fields['plant']['model']}, modules: {', '.join(rig.modules)}"),
         *_plant_rows(design),
@@ -59,15 +79,25 @@ def description(name: str, part: ExperimentAxis) -> str:
         ("", imperfections and f"accelerometer: {assignments(imperfections)}"),
         ("", _places(design)),
         ("compare", compare and f"{', '.join(compare.names())}; {compare.worlds} worlds"),
-        *(("push", push.words) for push in scenario.push),
-        *(("swing", swing.words) for swing in scenario.swing),
-        *_pivot_rows(part.plant),
-        ("omitted", missing and f"{', '.join(missing)}: not in the reduced model, its loop, the ceiling, floor_accel"),
-        *(row for judgement in judgements for row in judgement.rows),
-        *(("hint", hint) for hint in hints(design, part.plant)),
-        *(("hint", hint) for judgement in judgements for hint in judgement.hints),
     ]
-    return lines(f"{name}{f', axis {axis}' if axis else ''}: valid", rows)
+
+
+def _shareable_rows(part: ExperimentAxis) -> list[Rows]:
+    """Describe what acts on the robot and what is judged, in groups that all axes may have in common."""
+    scenario, design = part.scenario, part.design
+    missing = ", ".join(omissions(scenario).values())
+    omitted = f"{missing}: not in the reduced model, its loop, the ceiling, floor_accel"
+    judgements = [judge(design, part.plant) for judge in entries("judge").values()]
+    said = [*hints(design, part.plant), *(hint for judgement in judgements for hint in judgement.hints)]
+    groups = [
+        *([("push", push.words)] for push in scenario.push),
+        *([("swing", swing.words)] for swing in scenario.swing),
+        list(_pivot_rows(part.plant)),
+        [("omitted", omitted)] if missing else [],
+        *(list(judgement.rows) for judgement in judgements),
+        *([("hint", hint)] for hint in said),
+    ]
+    return [group for group in groups if group]
 
 
 def _places(design: Design) -> str:
@@ -123,14 +153,20 @@ def _law_rows(design: Design, fields: Mapping[str, TomlValue]) -> Iterator[tuple
         yield "", OWN_CODE
 
 
-def rig_description(name: str, part: ExperimentAxis, own: str = "") -> str:
+def rig_description(name: str, axes: Sequence[ExperimentAxis], own: str = "") -> str:
     """Describe a model file in the lines that `cmg-mj check` prints.
 
     Args:
         name: The file as the user called it.
-        part: One axis of a scenario with this model and all defaults.
+        axes: The axes of a scenario with this model and all defaults.
         own: The model's own scenario file, if it has one, whose gains are then not judged here.
     """
+    titles = [f"{name}: a rig{f', axis {part.name}' if part.name else ''}" for part in axes]
+    return _blocks(titles, [_rig_rows(name, part, own) for part in axes], f"{name}, on all axes")
+
+
+def _rig_rows(name: str, part: ExperimentAxis, own: str) -> list[Rows]:
+    """Describe a model about an axis, in groups that all axes may have in common."""
     rig, axis = part.design.rig, part.plant.axis.name
     about = f" --set push.0.axis={axis}" if axis else ""
     push_it = f"cmg-mj run push_recovery --set {shlex.quote(f'plant.model={name}')}{about}"
@@ -142,7 +178,7 @@ def rig_description(name: str, part: ExperimentAxis, own: str = "") -> str:
         law = f"the gains are its scenario's: cmg-mj check {shlex.quote(own)}"
     reduced = rig.reduced
     share = f", for one of {reduced.gimbals} gimbals" if reduced.gimbals > 1 else ""
-    rows = [
+    rows: Rows = [
         ("modules", ", ".join(rig.modules)),
         *_plant_rows(part.design),
         ("reduced", f"J1 = {reduced.J1:.6g}, J2 = {reduced.J2:.6g}, J_d = {reduced.J_d:.6g} kg m^2{share}"),
@@ -150,7 +186,5 @@ def rig_description(name: str, part: ExperimentAxis, own: str = "") -> str:
         *_pivot_rows(part.plant),
         ("physics", f"accurate with steps of up to {rig.largest_step:.3g} s"),
         ("law", law),
-        *(("hint", hint) for hint in clauses),
-        ("run it", push_it),
     ]
-    return lines(f"{name}: a rig{f', axis {axis}' if axis else ''}", rows)
+    return [rows, *([("hint", hint)] for hint in clauses), [("run it", push_it)]]

@@ -220,8 +220,7 @@ def check(file: str, settings: tuple[str, ...]) -> None:
         raise InputError(f"--set {settings[0]}: is for a scenario, as --rig is; {file} is a model")
     scenario = parse_scenario({"plant": {"model": file}}) if is_model else load_scenario(file, settings)
     describe = partial(rig_description, own=_scenario_beside(Path(file))) if is_model else description
-    parts = prepare(scenario).axes
-    click.echo("\n".join(describe(file, part) for part in parts), file=own_stdout())
+    click.echo(describe(file, prepare(scenario).axes), file=own_stdout())
 
 
 def _scenario_beside(model: Path) -> str:

@@ -35,6 +35,11 @@ class Symbolic:
 
     __slots__ = ()
 
+    @property
+    def is_array(self) -> bool:
+        """Whether it stands for the numbers of many worlds."""
+        return False
+
 
 def _traced(x: Any) -> bool:
     return isinstance(x, Symbolic)
@@ -145,4 +150,9 @@ def digitise(x: Scalar, limit: float, step: float) -> Scalar:
             x = copysign(limit, x)
         return round(x / step) * step if step else x
     x = np.minimum(np.maximum(x, -limit), limit)
+    if _traced(x):
+        counts = np.rint(x / step)
+        if not x.is_array:
+            counts = counts + 0.0  # makes -0 to 0, as `round` does
+        return np.where(step != 0.0, counts * step, x) if _traced(step) else counts * step if step else x
     return np.rint(x / step) * step if step else x

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol
 
-import numpy as np
-
-from cmg_mj.core.arrays import Scalar, Symbolic, clip
+from cmg_mj.core.arrays import Scalar, clip, where
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.failures import check_estimate, check_shape, is_trusted, stop, stop_not_finite
 from cmg_mj.core.sensor import Memory, Sensor, SensorState
@@ -341,9 +339,7 @@ class AxisControl:
                 name = type(self.law).__name__
                 raise RunStopped(f"law {name} returned {command} for u at t = {time:g} s")
             return after, clip(float(command), -limit, limit)
-        if isinstance(command, Symbolic):
-            return after, clip(command, -limit, limit)
-        return after, np.where(np.isfinite(command), clip(command, -limit, limit), command)  # judged elsewhere
+        return after, where(abs(command) < math.inf, clip(command, -limit, limit), command)  # judged elsewhere
 
     def drive(self, deciding: Deciding, u: Scalar) -> tuple[Deciding, Scalar]:
         """Turn the gimbals at a rate from now on: return the next memory, and the rate behind the servo's stages."""

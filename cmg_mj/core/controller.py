@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Delivered, Sampled, Tick
-from cmg_mj.core.errors import InputError
+from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.noise import Normals
-from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding, ideals_of
+from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding
 from cmg_mj.core.straight_line import Tables, straight_line
 from cmg_mj.core.types import Forces, Law, Observer, Setpoints
 
 _new = tuple.__new__
 
-PRINTED_AFTER = 64
-"""Control ticks after which one world runs on straight-line Python: a shorter run would not win back its printing."""
+PRINTED_AFTER = 32
+"""Control ticks after which a run goes on as straight-line Python: a shorter one would not win back its printing."""
 MAX_PHASES = 40
 """Instants of a common period beyond which nothing is printed: each has lines of its own."""
 
@@ -67,8 +67,7 @@ class Controller:
         world_ids: int | Sequence[int] = 0,
     ) -> None:
         rig = RigControl(tuple(axes), tuple(between))
-        self._single = isinstance(world_ids, int)
-        self.rig = rig if self._single else rig.for_worlds()
+        self.rig = rig if isinstance(world_ids, int) else rig.for_worlds()
         self.seed = seed
         self.world_ids = world_ids
         self.axes = rig.axes
@@ -83,7 +82,7 @@ class Controller:
         self._tables: Tables = {**noise, **self.rig.tables}
         self._common_period = self.rig.common_period
         phases = self._common_period // self.steps_per_sample
-        prints = self._single and phases <= MAX_PHASES and all(axis.is_trusted for axis in self.axes)
+        prints = phases <= MAX_PHASES and all(axis.is_trusted for axis in self.axes)
         settled = max(axis.settled for axis in self.axes)
         self._print_from = settled + PRINTED_AFTER * self.period if prints else math.inf
         self._printed: dict[tuple[str, int], Callable[..., Any]] = {}
@@ -137,10 +136,6 @@ class Controller:
         """Actuators that are moved beside the gimbals, and their controls since the last tick."""
         decision = self.state.decision
         return list(self.rig.actuators), () if decision is None else decision.setpoints
-
-    def body_rate(self, axis: int) -> Scalar:
-        """Return the rate of an axis' frame at the last update, as a perfect gyro along its line shows it [rad/s]."""
-        return ideals_of(self.state.readings)[axis].gyro
 
     def reset(self) -> None:
         """Forget everything: the next update is the first tick of a run with the same seed."""
@@ -238,9 +233,9 @@ class Controller:
         arguments: tuple[Any, ...],
         finite: Callable[[Any], Sequence[Scalar]] | None = None,
     ) -> Callable[..., Any]:
-        """Return a function of the rig, or its straight line, once it has run for a while in one world.
+        """Return a function of the rig, or its straight line, once it has run for a while.
 
-        Where the straight line fails or shows a number that is not finite, the function itself says why.
+        Where the straight line of one world fails or shows a number that is not finite, the function itself says why.
         """
         if step < self._print_from or self.state.deciding is None:
             return function
@@ -250,8 +245,11 @@ class Controller:
             return run
         try:
             *trees, tables = arguments
-            self._printed[phase] = straight_line(function, trees, tables, finite)
-        except InputError:
+            if isinstance(self.world_ids, int):
+                self._printed[phase] = straight_line(function, trees, tables, finite=finite)
+            else:
+                self._printed[phase] = straight_line(function, trees, tables, len(self.world_ids))
+        except (InputError, RunStopped):  # no formula of floats alone, such as one with a branch on them
             self._print_from = math.inf
             return function
         return self._printed[phase]

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar
+from cmg_mj.core.arrays import Scalar, Symbolic
 from cmg_mj.core.errors import RunStopped
 from cmg_mj.core.types import Law, Measurement, Observer
 
@@ -35,11 +35,13 @@ def check_estimate(estimate: Sequence[Scalar], names: Sequence[str], y: Measurem
 
 
 def check_shape(name: str, value: Scalar, y: Measurement) -> None:
-    """Refuse what is not a real number of each world.
+    """Refuse what is not a real number of each world; symbols are.
 
     Raises:
         TypeError: It has another shape than the measurement.
     """
+    if isinstance(y.y1, Symbolic):
+        return
     number = np.asarray(value)
     if np.ma.is_masked(value):
         raise TypeError(f"{name} is masked")

@@ -32,10 +32,12 @@ class Disturbance(Protocol):
 
     edges: Sequence[int] = ()
     """Physics steps that become instants."""
-    accelerates: bool = False
-    """Whether it accelerates the pivot: gravity of the plant's model then changes."""
     actuators: Sequence[int] = ()
     """Actuators that it moves."""
+
+    def placed(self, plants: Sequence[Any]) -> Sequence[Any]:
+        """Return the plants that it acts on, one a world: what changes a model gives each world its own."""
+        return plants
 
     def at(self, step: int, steps: int) -> Outside:
         """Return what acts from a physics step on, held or averaged for so many steps, until the next instant.

@@ -175,7 +175,21 @@ class FlickerNoise:
             (n, ...), in the reading's unit.
         """
         driven = self.spread * normals
-        for row in driven:
-            row += self.decay * self.wander
-            self.wander = row
+        if self.wander.size > len(CORNERS_HZ):
+            for row in driven:
+                row += self.decay * self.wander
+                self.wander = row
+            return driven.sum(axis=1)
+        numbers = driven.reshape(len(driven), -1)
+        for i, decay in enumerate(self.decay.ravel().tolist()):  # a float costs a fifth of an array of one
+            start = self.wander.flat[i].item()
+            numbers[:, i] = list(_wandered(numbers[:, i].tolist(), decay, start))
+        self.wander = driven[-1]
         return driven.sum(axis=1)
+
+
+def _wandered(gains: Sequence[float], decay: float, value: float) -> Iterator[float]:
+    """Yield a Gauss-Markov process after each gain."""
+    for gain in gains:
+        value = gain + decay * value
+        yield value

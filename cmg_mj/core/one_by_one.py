@@ -44,10 +44,12 @@ class OneByOne:
 
     Attributes:
         stands_for: The observer or the law.
+        rate_limit: Largest gimbal rate of a law; none of an observer [rad/s].
     """
 
     def __init__(self, part: Any) -> None:
         self.stands_for = part
+        self.rate_limit = getattr(part, "rate_limit", math.inf)
         self._copies: list[Any] = []
         self._lost: Any = None
 

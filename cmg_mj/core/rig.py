@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Deciding, Known, Sampled, Tick, require_one_period
@@ -35,6 +35,18 @@ class AxesOrders(NamedTuple):
     """Controls of the stages' `actuators`, one after the other."""
 
 
+class Sums(Protocol):
+    """Sums over the ticks of a run, of one or many worlds."""
+
+    def add(self, time: float, q: Any, power: Any, running: Any) -> None:
+        """Take a tick: its time [s], joint positions, the power of each actuator [W], which worlds have not ended."""
+        ...
+
+    def figures(self, world: int) -> Mapping[str, Any]:
+        """Return the figures of a world."""
+        ...
+
+
 class AxesStage:
     """An effect between the axes, after their decisions, once a control tick. Stages act one after the other."""
 
@@ -52,6 +64,14 @@ class AxesStage:
     def tables(self) -> Mapping[Any, Callable[[int], Sequence[float]]]:
         """What it looks up by the physics step: key -> function."""
         return {}
+
+    def sums(self, plant: Any, n_worlds: int) -> Sums | None:
+        """Make what sums up figures of a run of so many worlds; None if it has none."""
+        return None
+
+    def series(self, plant: Any) -> Callable[[Any, Any], Mapping[str, Any]] | None:
+        """Make a function of an axis and a trajectory: more lines of a recording, by their paths; None for none."""
+        return None
 
     def init(self, readings: MultiAxisReading, tables: Tables) -> Memory:
         """Return the memory before the first tick, from the readings there."""

@@ -197,6 +197,16 @@ class Sensor:
         return self.inside or self.period
 
     @property
+    def kept(self) -> int:
+        """Number of the last readings that the latency spans."""
+        return self.latency // self.period + 2 if self.latency else 1
+
+    @property
+    def older_kept(self) -> int:
+        """Number of the last samples that the skew spans."""
+        return self.skew // self.raw + 1 if self.skew else 0
+
+    @property
     def steps_per_sample(self) -> int:
         """Physics steps between the instants at which it may be due."""
         return math.gcd(self.period, self.raw, self.skew)
@@ -224,18 +234,21 @@ class Sensor:
         Returns:
             The state, with the first sample taken.
         """
-        taken = self._ideal(ideal)
-        older = (taken,) * (self.skew // self.raw + 1) if self.skew else ()
-        signal = self._joined(taken, older)
+        taken = self.ideal(ideal)
+        older = (taken,) * self.older_kept
+        memories, signal = self.started(self._joined(taken, older), ideal, tables)
+        state = SensorState(1, memories, (signal,) * self.kept, older)
+        for _ in range(self.settle):
+            state = self._sampled(state, True, ideal, tables)
+        return state._replace(readings=state.readings[:1] * self.kept)
+
+    def started(self, signal: Signal, ideal: IdealReading, tables: Tables) -> tuple[tuple[Memory, ...], Signal]:
+        """Pass the first sample through the stages: return their memories, and the reading."""
         memories = []
         for stage in self.stages:
             memory, signal = stage.step(stage.init(signal, ideal, tables), signal, ideal, 0, tables)
             memories.append(memory)
-        kept = self.latency // self.period + 2 if self.latency else 1
-        state = SensorState(1, tuple(memories), (signal,) * kept, older)
-        for _ in range(self.settle):
-            state = self._sampled(state, True, ideal, tables)
-        return state._replace(readings=state.readings[:1] * kept)
+        return tuple(memories), signal
 
     def sample(self, state: SensorState, step: int, ideal: IdealReading, tables: Tables) -> SensorState:
         """Take what is due at a physics step.
@@ -250,21 +263,27 @@ class Sensor:
             The next state.
         """
         if self.skew and (step + self.skew) % self.raw == 0:
-            state = state._replace(older=(self._ideal(ideal), *state.older[:-1]))
+            state = state._replace(older=(self.ideal(ideal), *state.older[:-1]))
         if step % self.raw:
             return state
         return self._sampled(state, step % self.period == 0, ideal, tables)
 
     def _sampled(self, state: SensorState, delivers: bool, ideal: IdealReading, tables: Tables) -> SensorState:
         sample, memories, readings, older = state
-        signal = self._joined(self._ideal(ideal), older)
+        after, signal = self.passed(memories, self._joined(self.ideal(ideal), older), ideal, sample, tables)
+        if delivers:
+            readings = (signal, *readings[:-1])
+        return _new(SensorState, (sample + 1, after, readings, older))
+
+    def passed(
+        self, memories: tuple[Memory, ...], signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[tuple[Memory, ...], Signal]:
+        """Pass a sample through the stages: return their next memories, and the reading."""
         after = []
         for stage, memory in zip(self.stages, memories, strict=True):
             memory, signal = stage.step(memory, signal, ideal, sample, tables)
             after.append(memory)
-        if delivers:
-            readings = (signal, *readings[:-1])
-        return _new(SensorState, (sample + 1, tuple(after), readings, older))
+        return tuple(after), signal
 
     def read(self, state: SensorState, step: int) -> Signal:
         """Return the newest reading that has been delivered by a physics step."""
@@ -272,7 +291,8 @@ class Sensor:
             return state.readings[0]
         return state.readings[step // self.period - (step - self.latency) // self.period]
 
-    def _ideal(self, ideal: IdealReading) -> Signal:
+    def ideal(self, ideal: IdealReading) -> Signal:
+        """Return its signal among the readings of perfect sensors."""
         signal = ideal[self._field]
         return (signal,) if self._is_scalar else signal
 

@@ -10,6 +10,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from cmg_mj.core import arrays
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tape import CHOICE, CONSTANT, INPUT, Symbol, Tape
 
@@ -45,6 +48,27 @@ PYTHON = {
     CHOICE: "{1} if {0} else {2}",
 }
 """NumPy's function -> Python on floats, which rounds as `arrays` does on them; `math` rounds `hypot` otherwise."""
+ON_ARRAYS = {
+    **PYTHON,
+    **{name: f"{name}({{0}})" for name in ("sqrt", "exp", "sin", "cos", "sign", "rint")},
+    **{name: f"{name}({{0}}, {{1}})" for name in ("copysign", "float_power", "maximum", "minimum")},
+    "power": "float_power({0}, {1})",
+    "arctan2": "atan2({0}, {1})",
+    "logical_and": "{0} & {1}",
+    "logical_or": "{0} | {1}",
+    "bitwise_and": "{0} & {1}",
+    "bitwise_or": "{0} | {1}",
+    "logical_not": "~{0}",
+    "invert": "~{0}",
+    CHOICE: "where({0}, {1}, {2})",
+}
+"""NumPy's function -> Python on arrays; what rounds otherwise than the C library is `arrays`' own."""
+CALLED_ON_ARRAYS = {
+    **{name: getattr(np, name) for name in ("sqrt", "sin", "cos", "sign", "rint", "where")},
+    **{name: getattr(np, name) for name in ("copysign", "float_power", "maximum", "minimum")},
+    "exp": arrays.exp,
+    "atan2": arrays.atan2,
+}
 ARGUMENT_TWICE = ("sign", "maximum", "minimum")
 LONGEST = 120
 """Longest expression that is written where it is used [characters]."""
@@ -69,13 +93,19 @@ class Count(int):
 
 
 class _Recorder:
-    """Replaces the numbers of trees by symbols, and prints the function."""
+    """Replaces the numbers of trees by symbols, and prints the function.
 
-    def __init__(self) -> None:
-        self.tape = Tape()
+    Args:
+        worlds: Number of worlds, on arrays; None for one, on floats.
+    """
+
+    def __init__(self, worlds: int | None) -> None:
+        self.tape = Tape(worlds)
         self.lines: list[str] = []
         self.endings: list[str] = []
         self.known: dict[str, Any] = {**vars(math), "new": tuple.__new__}
+        if worlds is not None:
+            self.known |= CALLED_ON_ARRAYS
         self._inputs = 0
         self._draws: dict[tuple[Any, str], Sequence[Symbol]] = {}
 
@@ -85,14 +115,16 @@ class _Recorder:
 
     def given(self, tree: Any) -> tuple[str, Any]:
         """Return a pattern of names for a tree, and the tree with symbols and counts in the place of its numbers."""
-        if type(tree) is float:
+        if type(tree) is float or self.tape.is_batched(tree):
             name = self._name("x")
             return name, self.tape.input(name)
+        if isinstance(tree, np.ndarray) and tree.ndim == 2:
+            return self.given(list(tree))
         if type(tree) is int:
             name = self._name("i")
             return name, Count(tree, name)
-        if not isinstance(tree, (tuple, list)):
-            return "_", tree
+        if tree is not None and not isinstance(tree, (tuple, list)):
+            raise InputError(f"{type(tree).__name__}: a straight line takes floats and whole numbers alone")
         if not tree:
             return "_", tree
         patterns, parts = zip(*map(self.given, tree), strict=True)
@@ -165,6 +197,7 @@ def straight_line(
     function: Callable[..., Any],
     trees: Sequence[Any],
     tables: Tables,
+    worlds: int | None = None,
     finite: Callable[[Any], Sequence[Any]] | None = None,
 ) -> Callable[..., Any]:
     """Record a pure function and return it as straight-line Python.
@@ -175,8 +208,10 @@ def straight_line(
     Args:
         function: Takes the trees and the tables. It has no branch on a float; what it does with whole numbers it does
             at every call, but for looking up at them and counting on.
-        trees: Arguments to record it with: floats and whole numbers in tuples and lists.
+        trees: Arguments to record it with: floats and whole numbers in tuples and lists; of many worlds arrays
+            (n_worlds,) or (channels, n_worlds) in the place of floats.
         tables: Tables to record it with.
+        worlds: Number of worlds, on arrays; None for one, on floats.
         finite: Selects the numbers of its result that must be finite: the straight line raises `ArithmeticError` where
             one is not.
 
@@ -186,11 +221,11 @@ def straight_line(
     Raises:
         InputError: The function cannot be recorded.
     """
-    recorder = _Recorder()
+    recorder = _Recorder(worlds)
     patterns, arguments = zip(*map(recorder.given, trees), strict=True)
     result = function(*arguments, {key: recorder.table(key, table) for key, table in tables.items()})
     places = [symbol.place for symbol in _symbols(result)]
-    texts, body = print_operations(recorder.tape, places)
+    texts, body = print_operations(recorder.tape, places, PYTHON if worlds is None else ON_ARRAYS, recorder.known)
     names = [f"a{i}" for i in range(len(trees))]
     unpacked = [f"{pattern} = {name}" for pattern, name in zip(patterns, names, strict=True)]
     checked = [texts[symbol.place] for symbol in _symbols(finite(result) if finite else ())]
@@ -222,7 +257,7 @@ def _symbols(tree: Any) -> Iterable[Symbol]:
 
 
 def print_operations(
-    tape: Tape, results: Sequence[int], words: Mapping[str, str] = PYTHON
+    tape: Tape, results: Sequence[int], words: Mapping[str, str] = PYTHON, known: dict[str, Any] | None = None
 ) -> tuple[dict[int, str], list[str]]:
     """Print the operations that results need as Python.
 
@@ -230,6 +265,7 @@ def print_operations(
         tape: The tape; an input's name is a name in Python.
         results: Places of the results.
         words: NumPy's function -> its expression, in which `{0}` is its first argument.
+        known: Where constants go that are arrays, by their names.
 
     Returns:
         The text of each place, and the lines before the results.
@@ -243,6 +279,9 @@ def print_operations(
         operation = tape.operations[place]
         if operation.name == INPUT:
             texts[place] = operation.value
+        elif operation.name == CONSTANT and isinstance(operation.value, np.ndarray):
+            texts[place] = f"c{place}"
+            known[texts[place]] = operation.value  # pyright: ignore[reportOptionalSubscript]
         elif operation.name == CONSTANT:
             texts[place] = _literal(operation.value)
         else:

@@ -60,11 +60,16 @@ class Operation(NamedTuple):
 class Tape:
     """Operations in their order; equal ones are one.
 
+    Args:
+        worlds: Number of worlds of which each symbol is an array (n_worlds,); None for one world, on floats.
+
     Attributes:
         operations: The operations; a number's place is its operation's index.
+        worlds: Number of worlds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, worlds: int | None = None) -> None:
+        self.worlds = worlds
         self.operations: list[Operation] = []
         self._places: dict[tuple, int] = {}
 
@@ -87,11 +92,18 @@ class Tape:
             if number.tape is not self:
                 raise InputError(f"a number remembered from an earlier recording {here()}")
             return number.place
-        if isinstance(number, np.ndarray) and number.ndim == 0:
-            return self.place(number[()])
+        if isinstance(number, np.ndarray):
+            if number.ndim == 0:
+                return self.place(number[()])
+            if self.is_batched(number):
+                return self._append(Operation(CONSTANT, value=number))
         if type(number) in (bool, int, float) or isinstance(number, (np.bool_, np.integer, np.floating)):
             return self._append(Operation(CONSTANT, value=float(number)))
         raise InputError(f"{type(number).__name__} where a real number belongs {here()}")
+
+    def is_batched(self, number: Any) -> bool:
+        """Return whether a constant has a number of each world."""
+        return isinstance(number, np.ndarray) and number.shape == (self.worlds,)
 
     def needed(self, results: Iterable[int]) -> set[int]:
         """Find the operations on which results depend, themselves among them."""
@@ -118,6 +130,8 @@ class Tape:
     def _append(self, operation: Operation) -> int:
         value = operation.value
         key = operation if value is None else (operation.name, repr(value))  # 0.0 and -0.0 differ
+        if isinstance(value, np.ndarray):
+            key = operation.name, id(value)
         place = self._places.get(key)
         if place is None:
             place = self._places[key] = len(self.operations)
@@ -142,10 +156,15 @@ class Symbol(Symbolic, NDArrayOperatorsMixin):
     def __repr__(self) -> str:
         return f"Symbol({self.place})"
 
+    @property
+    def is_array(self) -> bool:
+        """See `Symbolic`."""
+        return self.tape.worlds is not None
+
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Operand, **kwargs: Operand) -> Operand:
         if method != "__call__" or kwargs:
             raise InputError(f"numpy.{ufunc.__name__} with {', '.join(kwargs) or method} {here()}")
-        if any(isinstance(x, np.ndarray) and x.ndim for x in inputs):
+        if any(isinstance(x, np.ndarray) and x.ndim and not self.tape.is_batched(x) for x in inputs):
             return np.frompyfunc(partial(_applied, ufunc), ufunc.nin, 1)(*map(_boxed, inputs))
         return _applied(ufunc, *inputs)
 
@@ -212,11 +231,12 @@ def _applied(ufunc: np.ufunc, *inputs: Operand) -> Symbol:
 
 def _chosen(condition: Operand, yes: Operand, no: Operand) -> Operand:
     operands = condition, yes, no
-    if any(isinstance(x, np.ndarray) and x.ndim for x in operands):
+    tape = _tape_of(operands)
+    if any(isinstance(x, np.ndarray) and x.ndim and not tape.is_batched(x) for x in operands):
         return np.frompyfunc(_chosen, 3, 1)(*map(_boxed, operands))
-    if not isinstance(condition, Symbol):
+    if not isinstance(condition, Symbol) and not tape.is_batched(condition):
         return yes if condition else no
-    return condition.tape.record(CHOICE, *operands)
+    return tape.record(CHOICE, *operands)
 
 
 def _tape_of(inputs: Sequence[Operand]) -> Tape:

@@ -37,18 +37,10 @@ class Feature(NamedTuple):
     """Refuses what does not fit: (scenario, plant)."""
     edit: str = ""
     """Changes a parsed model: (spec, model as resolved, plant settings, section) -> finish(compiled model)."""
-    limit_step: str = ""
-    """Finds the longest physics step: (section, plant settings, step, path) -> step [s]."""
     disturbance: str = ""
     """Makes what acts from outside: (sections, plants, seed, worlds) -> Disturbance."""
     between: str = ""
     """Makes the stage between the axes: (section, plant, controls of the axes) -> AxesStage, or None."""
-    in_world: str = ""
-    """Makes the plant of a world: (section, plant, seed, world) -> plant."""
-    figures: str = ""
-    """Makes what sums up figures of a run: (section, plant, worlds, control period) -> sums with `add`, `figures`."""
-    series: str = ""
-    """Makes lines of a recording: (section, plant) -> (axis, trajectory) -> {folder/name: values}, or None."""
     judge: str = ""
     """Says what `cmg-mj check` prints of it: (design, plant) -> Judgement."""
     commands: Mapping[str, Command] = {}
@@ -62,18 +54,15 @@ FEATURES = {
     "bend": Feature(
         section="cmg_mj.features.bend:Bend",
         edit="cmg_mj.features.bend.edit:bend_frame",
-        limit_step="cmg_mj.features.bend.edit:limit_step",
         judge="cmg_mj.features.bend.verdict:describe_bend",
     ),
     "gait": Feature(
         section="cmg_mj.features.gait:Gait",
         edit="cmg_mj.features.gait.tiles:lay_tiles",
         check="cmg_mj.features.gait.walk:check_gait",
-        in_world="cmg_mj.features.gait.tiles:with_heights",
+        disturbance="cmg_mj.features.gait.tiles:tiled_floor",
         between="cmg_mj.features.gait.walk:walking",
         judge="cmg_mj.features.gait.walk:describe_gait",
-        figures="cmg_mj.features.gait.figures:walk_figures",
-        series="cmg_mj.features.gait.figures:walk_series",
     ),
     "pivot": Feature(
         section="cmg_mj.features.pivot:Pivot",

@@ -110,6 +110,23 @@ class Section:
         """Return the settings with whole paths of files, which may start from a folder."""
         return self
 
+    def limit_step(self, step_s: float | None, integrator: str, longest_s: float, path: Path) -> float:
+        """Return the longest physics step that follows what is set here.
+
+        Args:
+            step_s: The step that the scenario sets, None for none [s].
+            integrator: The integrator that it sets.
+            longest_s: The longest step without these settings [s].
+            path: The model's file, for messages.
+
+        Returns:
+            The step [s].
+
+        Raises:
+            InputError: The step or the integrator that is set does not follow it.
+        """
+        return longest_s
+
 
 def marked_fields(section: type, mark: type[Mark]) -> dict[str, Mark]:
     """Find the fields that have a mark.

@@ -216,16 +216,18 @@ def hints(design: Design, plant: Plant) -> list[str]:
     # Margin that a notch against a bend takes is no fault.
     is_for_bend = plant.bends and scenario.controller.notch_hz > 0.0
     fault = None if gains is None or (is_for_bend and gains.loop.is_stable) else gains.hint
-    others = *_ceiling_hints(design), fault, _sliding_hint(scenario, law, plant)
+    others = *_ceiling_hints(design, plant.axis.name), fault, _sliding_hint(scenario, law, plant)
     return [*(f"{plant.path}: {hint}" for hint in plant.hints), *(hint for hint in others if hint)]
 
 
-def _ceiling_hints(design: Design) -> Iterator[str]:
-    """Write clauses for a first tilt and for pushes from which no controller recovers."""
+def _ceiling_hints(design: Design, axis: str) -> Iterator[str]:
+    """Write clauses for a first tilt and for pushes about the axis from which no controller recovers."""
     limit = ceiling(design.rig.reduced, design.law.rate_limit)
     start, most = design.scenario.plant.initial_tilt_deg, math.degrees(limit.tilt)
     sizes = [("plant.initial_tilt_deg", start, most, "deg")]
     for i, push in enumerate(design.scenario.push):
+        if push.axis not in (None, axis):
+            continue
         most = limit.push_impulse(push.duration_s) / push.duration_s
         sizes.append((f"push.{i}.torque_n_m", push.torque_n_m, most, "N m"))
     for field, value, most, unit in sizes:

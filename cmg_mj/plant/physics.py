@@ -41,8 +41,9 @@ class OneWorld:
         self.tilt, self._ideal = plant.largest_tilt, plant.ideal_readings
 
     def __reduce__(self) -> tuple:
-        """Copy and pickle plant and data, which all else looks into."""
-        return OneWorld, (self._plant, self.data)
+        """Copy and pickle plant and data, which all else looks into, and what has changed since."""
+        changed = {"any_running": self.any_running, "_still": self._still}
+        return OneWorld, (self._plant, self.data), changed
 
     def state(self) -> State:
         """Read joint angles and rates as floats."""

@@ -14,7 +14,6 @@ import numpy as np
 
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.tilt import PairTilt
-from cmg_mj.inputs.features import entries
 from cmg_mj.plant.axis import Axis, ResolvedModel, read_reduced
 from cmg_mj.plant.elements import ACCELEROMETERS, BEND_JOINT, EQUILIBRIUM_KEY, Module, element_id
 from cmg_mj.plant.mjcf import data_at_keyframe
@@ -76,9 +75,9 @@ def apply(
         _set_turn_rate(model, key, settings.turn_rate_rad_s, path)
     modules = [*(module for axis in axes for module in axis.modules), *held]
     _vary_masses_and_friction(model, settings, path, axes, modules)
-    for name, limit_step in entries("limit_step").items():
-        if name in sections:
-            model.opt.timestep = limit_step(sections[name], settings, model.opt.timestep, path)
+    for section in sections.values():
+        longest = model.opt.timestep
+        model.opt.timestep = section.limit_step(settings.timestep_s, settings.integrator, longest, path)
     mujoco.mj_setConst(model, mujoco.MjData(model))  # makes what follows from the centres of mass
     speeds = [abs(module.speed) for axis in axes for module in axis.modules]
     shake_rate = max(speeds) if settings.flywheel_imbalance_kg_m else 0.0

@@ -84,6 +84,13 @@ class ExperimentAxis:
         """The observer in the loop, then the open-loop observers."""
         return [self.scenario.observer.kind, *self.scenario.open_loop_names()]
 
+    def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
+        """Make the closed loop of this axis a linear system: see `Experiment.linear_closed_loop`."""
+        from cmg_mj.linear.loop import linear_closed_loop  # no run needs it
+
+        with self.scenario.named_in_errors():
+            return linear_closed_loop(self.design, self.plant, plant)
+
     @property
     def hints(self) -> list[str]:
         """Clauses on what is no mistake and yet likely to make the plant fall."""
@@ -140,11 +147,18 @@ class Experiment:
         Returns:
             The controller.
         """
-        controls = [
+        controls = self._controls(observer)
+        return Controller(controls, self.between(controls), seed=self.scenario.seed, world_ids=world_ids)
+
+    def _controls(self, observer: Observer | None = None) -> list[AxisControl]:
+        return [
             part.design.axis_control(part.plant.interface, axis=i, observer=observer)
             for i, part in enumerate(self.axes)
         ]
-        return Controller(controls, self.between(controls), seed=self.scenario.seed, world_ids=world_ids)
+
+    def stages(self) -> list[AxesStage]:
+        """Make the stages between the axes, to be looked at."""
+        return self.between(self._controls())
 
     def axis_controller(
         self, what: str = "one controller", world_ids: int | Sequence[int] = 0, observer: Observer | None = None
@@ -316,14 +330,11 @@ class Experiment:
         plants = [plant] if single else list(plant)
         if driver != "native" and not single:
             raise InputError(f"driver = {driver!r}: drives one world, not a batch")
-        for name, make in entries("in_world").items():
-            own, worlds = self.scenario.section(name), np.atleast_1d(controller.world_ids).tolist()
-            plants = [make(own, rig, controller.seed, world) for rig, world in zip(plants, worlds, strict=True)]
         settings, keep = self.scenario.metrics, options.get("keep_trajectory", True)
         outside = outsides(self.scenario) if outside is None else outside
         acting = disturbances(outside, plants, controller.seed, controller.world_ids)
-        if single and any(one.accelerates for one in acting):
-            plants = [plants[0].with_own_model()]
+        for one in acting:
+            plants = list(one.placed(plants))
         timestep, duration_s = plants[0].timestep, self.scenario.duration_s
         steps = whole_steps(duration_s, timestep, "duration_s", f"{duration_s:g} s")
         recorders = {
@@ -350,12 +361,8 @@ class Experiment:
             from cmg_mj.runs.callback import CallbackLoop, control_callback  # the loop needs no callback of MuJoCo's
 
             loop, driving = CallbackLoop, control_callback(plants[0], controller)
-        sections = {make: self.scenario.section(name) for name, make in entries("figures").items()}
-        sums = [
-            one
-            for make, own in sections.items()
-            if (one := make(own, plants[0], len(plants), controller.axes[0].law.dt))
-        ]
+        counted = [stage.sums(plants[0], len(plants)) for stage in controller.rig.between]
+        sums = [one for one in counted if one is not None]
         ticks = loop(physics, controller, steps, acting, np.radians(settings.fall_angle_deg).item())
         rest, on_progress = Outcome("done", duration_s), options.get("on_progress")
         try:
@@ -454,11 +461,7 @@ class Experiment:
         Raises:
             InputError: Something in the loop is not linear, or not covered; the message names it.
         """
-        from cmg_mj.linear.loop import linear_closed_loop  # no run needs it
-
-        part = self.require_single_axis("linear_closed_loop")
-        with part.scenario.named_in_errors():
-            return linear_closed_loop(part.design, part.plant, plant)
+        return self.require_single_axis("linear_closed_loop").linear_closed_loop(plant)
 
     @property
     def hints(self) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.controller import Controller
+from cmg_mj.core.rig import ideals_of
 from cmg_mj.plant.physics import Joints
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.baselines import RATES, Baselines
@@ -96,10 +97,11 @@ class TickRecorder:
             torque: The push, a float, or (n_worlds,) [N m].
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
-        body_rate = self._controller.body_rate(self._number)
+        state = self._controller.state
+        body_rate = ideals_of(state.readings)[self._number].gyro
         if not self._single:  # a row of all sensors' readings, which would be held as long
             body_rate = body_rate.copy()
-        self._waiting.append((q, v, self._controller.ticks[self._number], body_rate, torque, running))
+        self._waiting.append((q, v, state.decision.ticks[self._number], body_rate, torque, running))
         if len(self._waiting) >= TICKS_A_PIECE:
             self.flush()
 

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmg_mj.inputs.features import entries
 from cmg_mj.plant.mjcf import quiet
 from cmg_mj.results.folder import RunFolder, claimed, write_parquet, write_text
 from cmg_mj.results.result import Outcome, Result
@@ -193,9 +192,7 @@ def recording_header(experiment: Experiment, driver: str = "native", world: int 
         settings=scenario.metrics,
         rate_limit_rad_s=experiment.law.rate_limit,
         scenario_toml=experiment.as_toml(driver, world),
-        lines=[
-            line for name, make in entries("series").items() if (line := make(scenario.section(name), experiment.plant))
-        ],
+        lines=[line for stage in experiment.stages() if (line := stage.series(experiment.plant)) is not None],
     )
 
 

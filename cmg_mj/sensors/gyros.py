@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain, count, islice
 from typing import Annotated, Any, Literal
@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from cmg_mj.core.arrays import Scalar, digitise, radians
-from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, wander_shares
+from cmg_mj.core.arrays import Scalar, Symbolic, digitise, radians
+from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of, wander_shares
 from cmg_mj.core.sensor import Cut, Memory, Sensor, SensorStage, Signal, Site, steps_until
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import IdealReading
@@ -144,14 +144,14 @@ class MemsGyro:
         """Count the samples of the calibration, one every dt [s]."""
         return round(self.calibration_s / dt)
 
-    def _offset(self, dt: float, mean: Any, part: np.ndarray, reading: str) -> tuple[Any, Any]:
+    def _offset(self, dt: float, mean: Any, part: Sequence[Any] | np.ndarray, reading: str) -> tuple[Any, Any]:
         """Return the offset that remains, and its drift in a sample [rad/s]."""
         bias = math.radians(self.bias_deg_s)
         if reading == "calibrated":
             return bias - mean, 0.0
-        signs = np.sign(part)
-        offset = bias + math.radians(self.as_bought_offset_deg_s) * signs[0]
-        return offset, math.radians(self.as_bought_drift_deg_s_k * self.warming_k_min / 60.0) * dt * signs[1]
+        first, second = map(np.sign, part)
+        offset = bias + math.radians(self.as_bought_offset_deg_s) * first
+        return offset, math.radians(self.as_bought_drift_deg_s_k * self.warming_k_min / 60.0) * dt * second
 
     def shown(self, rate: Scalar, errors: Scalar) -> Scalar:
         """Read a true rate with these errors of the zero, elementwise [rad/s]."""
@@ -209,9 +209,11 @@ class CheapGyro(SensorStage):
 
     def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
         """Return the processes of the 1/f noise, the offset, its drift in a sample, and the samples taken."""
+        part = tables[self.part_stream](0) if self.part_stream in self.draws else [0.0 * signal[0]] * 2
+        if isinstance(signal[0], Symbolic):
+            return self._recorded(part, tables[self.stream])
         rests = map(tables[self.stream], count())
-        part = np.array(tables[self.part_stream](0) if self.part_stream in self.draws else [0.0 * signal[0]] * 2)
-        part = part.reshape(2, -1)
+        part = np.array(part).reshape(2, -1)
         *wander, offset, drift = (row for rows in self.gyro.rested(self.dt, rests, part) for row in np.atleast_2d(rows))
         numbers = [*wander, offset, drift, np.zeros_like(offset)]
         return tuple(number.copy() if np.ndim(signal[0]) else number.item() for number in numbers)
@@ -221,14 +223,26 @@ class CheapGyro(SensorStage):
     ) -> tuple[Memory, Signal]:
         """See `SensorStage`."""
         *wander, offset, drift, taken = memory
-        white, *normals = tables[self.stream](sample + self._before)
+        after, common = self._noise(wander, tables[self.stream](sample + self._before))
+        shown = self.gyro.shown(signal[0], common + (offset + drift * taken))
+        return (*after, offset, drift, taken + 1.0), (shown,)
+
+    def _noise(self, wander: Sequence[Scalar], normals: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
+        """Advance the 1/f noise by a sample: return its processes, and the error with the white noise [rad/s]."""
+        white, *normals = normals
         decays, spreads = self._shares
         moved = zip(spreads, normals, decays, wander, strict=True)
         after = [spread * normal + decay * before for spread, normal, decay, before in moved]
         one, two, three, four = after
-        common = self.gyro.white_noise_sigma(self.dt) * white + (one + two + three + four)
-        shown = self.gyro.shown(signal[0], common + (offset + drift * taken))
-        return (*after, offset, drift, taken + 1.0), (shown,)
+        return after, self.gyro.white_noise_sigma(self.dt) * white + (one + two + three + four)
+
+    def _recorded(self, part: Sequence[Scalar], stream: Any) -> Memory:
+        """Return what `init` does for symbols, whose stream records the rest before the run as a loop."""
+        spread = spread_of(self.gyro.flicker_floor)
+        start = [spread * normal for normal in stream(0)[1:]]
+        wander, mean = stream.mean(self._noise, start, self.gyro.resting_samples(self.dt), PIECE)
+        offset, drift = self.gyro._offset(self.dt, mean, part, self.gyro.reading)
+        return (*wander, offset, drift, 0.0)
 
     @cached_property
     def _before(self) -> int:

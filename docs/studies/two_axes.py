@@ -90,9 +90,9 @@ def the_rig() -> str:
 def turning() -> str:
     """Torques that a turn at 1 rad/s asks of the tilts at x3 = 40 and 10 degrees, at several gimbal rates."""
     plant = load_plant(model="two_axes.xml", equilibrium_bias_deg=0.0)
-    c = plant.turning.flywheels
+    c = np.array(plant.turning.flywheels)
     print("c =", ", ".join(f"[{', '.join(f'{value:+.0f}' for value in row + 0.0)}]" for row in np.round(c, 9)), "\n")
-    d = plant.turning.inertia + 0.0
+    d = np.array(plant.turning.inertia) + 0.0
     print("d =", ", ".join(f"[{', '.join(f'{value:+.3f}' for value in row)}]" for row in np.round(d, 9)), "s\n")
     roll, pitch = x3 = math.radians(40.0), math.radians(10.0)
     exact = c[0, 1] * math.sin(pitch) / math.cos(roll), c[1, 0] * math.sin(roll) / math.cos(pitch)

@@ -83,7 +83,8 @@ def fastest_turn(rates: Sequence[float] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.
         for rate in rates:
             experiment = two_axes(f"plant.turn_rate_rad_s={rate}", f"controller.compensate_turning={against}")
             derived = experiment.plant.turning
-            experiment.plant.__dict__["turning"] = derived._replace(flywheels=sign * derived.flywheels)
+            flywheels = sign * np.array(derived.flywheels)
+            experiment.plant.__dict__["turning"] = derived._replace(flywheels=flywheels.tolist())
             outcome = experiment.run(keep_trajectory=False).outcomes[0]
             row.append(f"fell at {outcome.time_s:.1f} s" if outcome.fell else "stands")
         rows.append(row)

@@ -57,6 +57,7 @@ GROUPS: dict[str, Rows] = {
     ],
     "rough": [
         ("gyro_free, 100 ug, tiles and pushes", 0.25, [QUIET, TILES, *PUSHES]),
+        ("the same, turns not compensated", 0.25, [QUIET, TILES, *PUSHES, "controller.compensate_turning=false"]),
         ("gyro_free, 400 ug, tiles and pushes", 0.0, [STOCK, TILES, *PUSHES]),
         ("gyro_free, 400 ug, tiles", 0.0, [STOCK, TILES]),
     ],

@@ -14,6 +14,7 @@ from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.runs.save import report_run, save_run
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import CommandOutcome, cmg_mj
+from tests.recorded import assert_same_bits, recorded
 
 SHORT = ("duration_s=2", "push.0.start_s=1", "push.1.start_s=1")
 
@@ -65,16 +66,11 @@ def test_what_a_run_writes_reruns_and_has_every_axis(tmp_path: Path) -> None:
     experiment = two_axes("axes.roll.observer.kind=adaptive", "axes.pitch.controller.lqr.state_cost=[1, 1, 1, 1]")
     result = experiment.run()
     place = save_run(tmp_path / "run", report_run(experiment, result), plot=True)
-    assert result.trajectory is not None
-
-    rerun = prepare(load_scenario(str(place / "scenario.toml"))).run().trajectory
-    assert rerun is not None
     trajectory = Trajectory.load(place / "trajectory.parquet")
     assert trajectory.axes == ("roll", "pitch")
-    assert trajectory.layout == result.trajectory.layout
-    for name, column in result.trajectory.columns.items():
-        np.testing.assert_array_equal(rerun[name], column, err_msg=name)
-        np.testing.assert_array_equal(trajectory[name], column, err_msg=name)
+    assert trajectory.layout == recorded(result).layout
+    assert_same_bits(trajectory, recorded(result))
+    assert_same_bits(recorded(prepare(load_scenario(str(place / "scenario.toml"))).run()), trajectory)
     roll = trajectory.along("roll")
     assert roll.observers == ("adaptive",)
     np.testing.assert_array_equal(roll["estimate/adaptive/bias_rad"], trajectory["roll/estimate/adaptive/bias_rad"])
@@ -123,10 +119,8 @@ def test_a_push_moves_the_axis_that_it_is_about() -> None:
         "controller.feedback=fog",
     )
     for i, name in enumerate(("roll", "pitch")):
-        trajectory = (
-            two_axes(*calm, "axes.pitch.plant.equilibrium_bias_deg=0", f"push.{1 - i}.torque_n_m=0").run().trajectory
-        )
-        assert trajectory is not None
+        settings = "axes.pitch.plant.equilibrium_bias_deg=0", f"push.{1 - i}.torque_n_m=0"
+        trajectory = recorded(two_axes(*calm, *settings).run())
         push_rows = slice(200, 230)
         peaks = {axis: np.abs(trajectory[f"{axis}/x2_rad_s"][push_rows]).max() for axis in ("roll", "pitch")}
         assert peaks.pop(name) > 5.0 * max(peaks.values())
@@ -139,7 +133,28 @@ def test_check_says_what_each_axis_amounts_to() -> None:
     assert outcome.out.count(": valid") == 2
     assert "two_axes, axis roll" in outcome.out
     assert "equilibrium bias -0.3 deg" in outcome.out
-    assert "push        1 N m about pitch from 6 s to 6.1 s" in outcome.out
+    assert outcome.out.count("push        1 N m about pitch from 6 s to 6.1 s") == 1
+
+
+SHAKEN = "sensors.accelerometer.averaged=false"
+
+
+def test_what_is_of_the_robot_is_said_once() -> None:
+    (hint,) = prepare(load_scenario("walk", [SHAKEN])).hints
+    assert hint.startswith("[gait]: the legs' servos shake accelerometers that show instants")
+    out = cmg_mj("check", "walk", "--set", SHAKEN).out
+    shared = out.partition("walk, on all axes\n")[2]
+    assert [line.split()[0] for line in shared.splitlines()] == ["omitted", "gait", "hint"]
+    assert out.count(hint) == 1
+
+
+def test_a_push_beyond_the_ceiling_is_said_of_its_own_axis() -> None:
+    (hint,) = two_axes("push.0.torque_n_m=30").hints
+    assert hint.startswith("roll: push.0.torque_n_m = 30: no controller recovers from more than 4.84 N m")
+    roll, pitch = cmg_mj("check", "two_axes", "--set", "push.0.torque_n_m=30").out.split("two_axes, axis pitch")
+    assert "no controller recovers from more than" in roll
+    assert "no controller recovers from more than" not in pitch
+    assert two_axes("push.0.torque_n_m=30", 'plant.locked_axes=["roll"]').hints == []
 
 
 def test_the_command_prints_each_axis(run_outcome: CommandOutcome, run_summary: dict[str, Any]) -> None:

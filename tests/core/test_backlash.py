@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
+from cmg_mj.core.axis import CommandStage
 from cmg_mj.plant.plant import load_plant
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment
@@ -15,6 +16,16 @@ from cmg_mj.stages.backlash import Backlash
 from tests.recorded import push_recovery, recorded
 
 DT = 0.005
+
+
+def behind(stage: CommandStage, commands: np.ndarray) -> np.ndarray:
+    """Return what a stage makes of commands, (n,) of one world on floats, or (n, n_worlds)."""
+    rows: Any = commands.tolist() if commands.ndim == 1 else commands
+    memory, passed = stage.init(0.0 * rows[0]), []
+    for command in rows:
+        memory, rate = stage.step(memory, command)
+        passed.append(rate)
+    return np.array(passed)
 
 
 def experiment(*settings: str) -> Experiment:
@@ -30,15 +41,12 @@ def test_the_gap_in_radians() -> None:
 def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None) -> None:
     """The motor swings by 2 about 0 behind a gap of 1; its angle less half the gap forward, plus half backward."""
     motor = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 401))
-    rates: Any = np.diff(motor) / DT
-    play = Backlash(1.0 if worlds is None else np.full(worlds, 1.0), DT)
-    gimbal = [0.0]
-    for rate in rates.tolist():
-        gimbal_rate = play(rate if worlds is None else np.full(worlds, rate))
-        if worlds is not None:
-            assert np.ptp(gimbal_rate) == 0.0
-        gimbal.append(gimbal[-1] + DT * float(np.max(gimbal_rate)))
-    angle = np.array(gimbal)
+    rates = np.diff(motor) / DT
+    gap = 1.0 if worlds is None else np.full(worlds, 1.0)
+    commands = rates if worlds is None else np.tile(rates[:, None], worlds)
+    turned = behind(Backlash(gap, DT), commands).reshape(len(rates), -1)
+    assert np.ptp(turned, axis=1).max() == 0.0
+    angle = np.concatenate([[0.0], np.cumsum(turned[:, 0] * DT)])
     assert np.abs(motor - angle).max() == pytest.approx(0.5)
     assert angle[50] == pytest.approx(1.5)  # the top of the first swing
     assert angle[60] == pytest.approx(1.5)  # the motor has turned back by 0.38
@@ -49,11 +57,9 @@ def test_the_gimbal_rests_until_the_motor_has_crossed_the_gap(worlds: int | None
 
 def test_without_a_gap_the_command_goes_through_as_it_is() -> None:
     rates = np.random.default_rng(0).normal(size=(50, 2))
-    play = Backlash(np.array([0.0, 0.1]), DT)
-    gimbal_rates = np.array([play(rate) for rate in rates])
+    gimbal_rates = behind(Backlash(np.array([0.0, 0.1]), DT), rates)
     np.testing.assert_array_equal(gimbal_rates[:, 0], rates[:, 0])
-    alone = Backlash(0.1, DT)
-    np.testing.assert_array_equal(gimbal_rates[:, 1], [alone(float(rate)) for rate in rates[:, 1]])
+    np.testing.assert_array_equal(gimbal_rates[:, 1], behind(Backlash(0.1, DT), rates[:, 1]))
 
 
 def gimbals_from_commands(run: Trajectory, gap: float) -> np.ndarray:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from cmg_mj.core.controller import Controller, KnownPlant
+from cmg_mj.core.axis import KnownPlant
+from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.tilt import GimbalAngle, PairTilt
 from cmg_mj.core.types import IdealReading
@@ -19,7 +21,7 @@ from cmg_mj.laws.state_feedback import StateFeedback, lqr_gains
 from cmg_mj.observers import Estimate, Measurement, make_observer
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import prepare
-from cmg_mj.scenario.design import make_controller
+from cmg_mj.scenario.design import make_axis
 from cmg_mj.scenario.loading import parse_scenario
 from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
@@ -174,14 +176,13 @@ def reading(tilt: float, gimbal: float, rate: float) -> IdealReading:
     return IdealReading((x, z, x, z), [math.pi / 2.0 + gimbal, math.pi / 2.0 - gimbal], rate, rate)
 
 
-def controller(observer: Any, law: StateFeedback | None = None, **options: Any) -> Controller:
-    return make_controller(
-        observer,
-        law or StateFeedback(DT),
-        IDEAL_SENSORS,
-        KnownPlant(PairTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001),
-        **options,
-    )
+PLANT = KnownPlant(PairTilt(0.1, 0.3), GimbalAngle((1.0, -1.0), (math.pi / 2.0, math.pi / 2.0)), 0.001)
+
+
+def controller(
+    observer: Any, law: StateFeedback | None = None, sensors: Sensors = IDEAL_SENSORS, seed: int = 0, **options: Any
+) -> Controller:
+    return Controller([make_axis(observer, law or StateFeedback(DT), sensors, PLANT, **options)], seed=seed)
 
 
 READINGS = [reading(0.01, 0.0, 0.5), reading(0.02, 0.1, 0.6), reading(-0.01, 0.2, 0.7), reading(0.03, -0.1, 0.8)]
@@ -218,13 +219,9 @@ def test_observer_gets_the_sample_and_the_command_held_since_the_last() -> None:
 @pytest.mark.parametrize("feedback", ["observer", "fog", "truth"])
 def test_law_acts_on_the_signals_of_its_settings(feedback: Any, angles: Any) -> None:
     """(8) with y1, y2 or their estimates; the rate from the observer, the gyro (here off by 0.02) or the truth."""
-    loop = controller(Script(ESTIMATES.__getitem__), feedback=feedback, angle_source=angles)
-    loop.sensors = Sensors(
-        IDEAL_SENSORS.accelerometer,
-        IDEAL_SENSORS.encoder,
-        Fog(angle_random_walk_deg_rth=0.0, bandwidth_hz=0.0, bias_deg_h=math.degrees(0.02) * 3600.0),
-    )
-    loop.reset()
+    fog = replace(IDEAL_SENSORS.fog, bias_deg_h=math.degrees(0.02) * 3600.0)
+    sensors = replace(IDEAL_SENSORS, fog=fog)
+    loop = controller(Script(ESTIMATES.__getitem__), sensors=sensors, feedback=feedback, angle_source=angles)
     x_e = 0.0
     for ideal, estimate, tick in zip(READINGS, ESTIMATES, ticks(loop), strict=True):
         assert tick.fog == pytest.approx(ideal.rate + 0.02, rel=1e-12)
@@ -238,7 +235,7 @@ def test_law_acts_on_the_signals_of_its_settings(feedback: Any, angles: Any) -> 
 def test_open_loop_observers_see_the_same_and_change_nothing() -> None:
     open_loop_observer = Script(lambda k: Estimate(9.0, -9.0 * k, 9.0))
     alone, observer = ticks(controller(Script(ESTIMATES.__getitem__))), Script(ESTIMATES.__getitem__)
-    both_ticks = ticks(controller(observer, open_loop_observers={"hers": open_loop_observer}))
+    both_ticks = ticks(controller(observer, open_loop_observers=[open_loop_observer]))
     assert open_loop_observer.calls == observer.calls
     assert [tick.u for tick in both_ticks] == [tick.u for tick in alone]
     assert [tick.estimates[1].x2 for tick in both_ticks] == [0.0, -9.0, -18.0, -27.0]
@@ -252,7 +249,7 @@ class WithBias(Script):
 
 def test_extra_signals_follow_the_state() -> None:
     loop = controller(WithBias(lambda k: (0.1, 0.2, 0.3, 0.4 * k, 0.5 * k)))
-    assert loop.extra_signals == [("torque_n_m", "bias_rad")]
+    assert loop.axes[0].extra_signals == [("torque_n_m", "bias_rad")]
     assert [tuple(tick.estimates[0])[3:] for tick in ticks(loop)] == [
         (0.0, 0.0),
         (0.4, 0.5),
@@ -280,9 +277,7 @@ def test_trim_needs_a_bias_and_an_integrator() -> None:
 
 
 def test_reset_starts_the_same_run_again() -> None:
-    loop = controller(make_observer("homogeneous", DT, PAPER), seed=3)
-    loop.sensors = Sensors()
-    loop.reset()
+    loop = controller(make_observer("homogeneous", DT, PAPER), sensors=Sensors(), seed=3)
     first = ticks(loop)
     loop.reset()
     assert loop.tick is None

@@ -10,6 +10,7 @@ import pytest
 
 from cmg_mj import InputError
 from cmg_mj.stages.notch import DEPTH_DAMPING, WIDTH_DAMPING, Notch
+from tests.core.test_backlash import behind
 from tests.recorded import push_recovery, recorded
 
 DT = 0.005
@@ -18,12 +19,8 @@ DT = 0.005
 def gain(hz: float, middle_hz: float) -> complex:
     """The amplitude of a sine after the notch has settled."""
     inputs = np.exp(2.0j * math.pi * hz * DT * np.arange(4000))
-    real, imaginary = (_through(Notch(middle_hz, DT, math.inf), part) for part in (np.real(inputs), np.imag(inputs)))
+    real, imaginary = (behind(Notch(middle_hz, DT, math.inf), part) for part in (np.real(inputs), np.imag(inputs)))
     return complex(np.mean(((real + 1j * imaginary) / inputs)[2000:]))
-
-
-def _through(notch: Notch, commands: np.ndarray) -> np.ndarray:
-    return np.array([notch(float(u)) for u in commands])
 
 
 @pytest.mark.parametrize("hz", [0.5, 4.0, 9.0, 10.0, 11.0, 30.0])
@@ -42,22 +39,21 @@ def test_a_25th_is_left_in_the_middle_and_a_constant_passes() -> None:
 
 def test_worlds_side_by_side_are_single_worlds() -> None:
     commands = np.random.default_rng(1).normal(size=(50, 3))
-    batch, singles = Notch(10.0, DT, 1.5), [Notch(10.0, DT, 1.5) for _ in range(3)]
-    for row in commands:
-        assert batch(row).tolist() == [one(float(u)) for one, u in zip(singles, row, strict=True)]
+    notch = Notch(10.0, DT, 1.5)
+    np.testing.assert_array_equal(behind(notch, commands), np.transpose([behind(notch, part) for part in commands.T]))
 
 
 def test_its_result_is_within_the_limit() -> None:
-    notch = Notch(30.0, DT, 1.0)
-    assert max(abs(notch(3.0 * (-1.0) ** (k // 50))) for k in range(100)) == 1.0
+    commands = np.repeat([3.0, -3.0], 50)
+    assert np.abs(behind(Notch(30.0, DT, 1.0), commands)).max() == 1.0
 
 
 def test_the_command_that_is_recorded_and_observed_is_behind_it() -> None:
-    plain, behind = (
+    plain, notched = (
         recorded(push_recovery("duration_s=0.3", "push=[]", *more).run()) for more in ([], ["controller.notch_hz=20"])
     )
-    first = Notch(20.0, DT, math.inf)(float(plain["u_rad_s"][0]))
-    assert behind["u_rad_s"][0] == first != plain["u_rad_s"][0]
+    (first,) = behind(Notch(20.0, DT, math.inf), plain["u_rad_s"][:1])
+    assert notched["u_rad_s"][0] == first != plain["u_rad_s"][0]
 
 
 def test_it_lies_below_half_the_rate() -> None:

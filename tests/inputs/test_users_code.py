@@ -202,7 +202,7 @@ def test_what_fails_in_a_run_is_shown_once_and_the_record_kept(part: type, shown
     assert outcome.status == 2
     assert outcome.err.count(shown) == 1
     assert "t = 0.15 s" in outcome.err
-    assert "runners.py" not in outcome.err
+    assert "cmg_mj/core" not in outcome.err
     assert ("test_users_code.py" in outcome.err) == ("Zero" in shown)
     assert len(assert_whole("it")) == 30
 

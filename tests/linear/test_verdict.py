@@ -141,9 +141,11 @@ def test_a_notch_is_in_the_rigid_loop() -> None:
     model, K, notch = load_plant().reduced, np.array([35.0, 4.0, -1.0, 0.3]), Notch(8.0, 0.005, math.inf)
     A, B, _ = hold_matrices(model.A_e, model.B_e, 0.005)
     x, tilts = np.array([0.01, 0.0, 0.0, 0.0]), []
+    memory = notch.init(0.0)
     for _ in range(40):
         tilts.append(float(x[0]))
-        x = A @ x + B[:, 0] * notch(float(-K @ x))
+        memory, u = notch.step(memory, float(-K @ x))
+        x = A @ x + B[:, 0] * u
     for poles, is_whole in ((notched.loop.poles, True), (plain.loop.poles, False)):
         remainder = np.convolve(tilts, np.poly(np.exp(0.005 * poles)).real, "valid")
         assert (np.abs(remainder).max() < 1e-9) == is_whole

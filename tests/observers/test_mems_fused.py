@@ -13,6 +13,7 @@ from cmg_mj.runs.open_loop import replay
 from cmg_mj.scenario.loading import load_scenario
 from tests.observers.reference import DT, NOISE, observer
 from tests.observers.reference import run as walk
+from tests.recorded import recorded
 
 ERROR = "velocity_rms_error_rad_s"
 
@@ -34,8 +35,7 @@ def test_in_a_run_it_reads_the_baselines_gyro(setting: str) -> None:
     setting = f"sensors.{setting}"
     plain = push(setting, kind="gyro_free").run()
     beside = push(setting, 'open_loop_observers=["mems_fused"]', kind="gyro_free").run()
-    assert plain.trajectory is not None
-    assert GYRO not in plain.trajectory
+    assert GYRO not in recorded(plain)
     assert beside.mean(ERROR, MEMS_FUSED) == pytest.approx(plain.mean(ERROR, MEMS_FUSED), rel=1e-9)
     assert beside.mean(ERROR) == plain.mean(ERROR)  # the other sensors' noise is as it was
 
@@ -44,12 +44,10 @@ def test_it_closes_the_loop_and_is_replayed_bit_by_bit() -> None:
     """20 deg/s of offset do not matter; the gyro shows the rate, its offset and 3 % of scale error."""
     experiment = push()
     result, batch = experiment.run(), experiment.run_many(2)
-    t = result.trajectory
+    t = recorded(result)
     assert result.stood.all()
-    assert t is not None
-    assert batch.trajectory is not None
     assert (batch.values(ERROR) < 0.01).all()
-    np.testing.assert_array_equal(batch.trajectory[GYRO][:, 0], t[GYRO])
+    np.testing.assert_array_equal(recorded(batch)[GYRO][:, 0], t[GYRO])
     for name, values in zip(STATE_SIGNALS, replay(experiment.design.observer(), t), strict=True):
         np.testing.assert_array_equal(values, t[f"estimate/{MEMS_FUSED}/{name}"])
     offset = t[GYRO] - 1.03 * t["x2_rad_s"]

@@ -9,6 +9,7 @@ from cmg_mj.papers.sokolov2019 import backlash
 from cmg_mj.papers.sokolov2019.backlash import cycles, describing_function
 from cmg_mj.papers.sokolov2019.rig import experiment
 from cmg_mj.stages.backlash import Backlash
+from tests.core.test_backlash import behind
 
 
 @pytest.mark.parametrize("c", [-0.9, -0.3, 0.0, 0.6])
@@ -17,11 +18,9 @@ def test_share_is_the_fundamental_of_what_a_gap_passes(c: float) -> None:
     dt = experiment().law.dt
     gap = 1.0 + c
     phase = np.linspace(0.0, 6.0 * np.pi, 6001)
-    behind = Backlash(gap, dt)
-    angle = [0.0]
-    for rate in np.diff(np.sin(phase)) / dt:
-        angle.append(angle[-1] + dt * behind(float(rate)))
-    last = np.array(angle)[4000:6000]
+    rates = np.diff(np.sin(phase)) / dt
+    angle = np.cumsum(dt * behind(Backlash(gap, dt), rates))
+    last = angle[3999:5999]
     fundamental = 2.0 * np.mean(last * np.exp(-1j * phase[4000:6000])) * 1j
     assert complex(fundamental) == pytest.approx(describing_function(c), abs=2e-3)
 

@@ -13,7 +13,7 @@ import pytest
 
 import cmg_mj
 from cmg_mj.core.errors import InputError
-from cmg_mj.results.trajectory import Trajectory
+from tests.recorded import recorded
 
 SHORT = ["duration_s=0.4", "push=[]"]
 BIASES = [0.5, 40.0]  # one stands, one falls
@@ -34,14 +34,9 @@ def one() -> cmg_mj.Result:
     return experiment().run()
 
 
-def trajectory(result: cmg_mj.Result) -> Trajectory:
-    assert result.trajectory is not None
-    return result.trajectory
-
-
 EVERY: dict[str, Callable[[], Any]] = {
-    "trajectory": lambda: trajectory(one()),
-    "trajectory of many worlds": lambda: trajectory(many()),
+    "trajectory": lambda: recorded(one()),
+    "trajectory of many worlds": lambda: recorded(many()),
     "result": many,
 }
 every = pytest.mark.parametrize("make", [pytest.param(make, id=name) for name, make in EVERY.items()])
@@ -60,7 +55,7 @@ def test_keys_iteration_and_look_up_agree(make: Callable[[], Any]) -> None:
 
 def test_a_trajectory_as_a_frame() -> None:
     pandas = pytest.importorskip("pandas")
-    one_world = trajectory(one())
+    one_world = recorded(one())
     frame = one_world.to_pandas()
     assert list(frame.columns) == one_world.keys()
     np.testing.assert_array_equal(frame["x1_rad"], one_world["x1_rad"])
@@ -69,7 +64,7 @@ def test_a_trajectory_as_a_frame() -> None:
 
 def test_many_worlds_as_a_frame_have_a_row_a_world_and_tick() -> None:
     pytest.importorskip("pandas")
-    worlds = trajectory(many())
+    worlds = recorded(many())
     frame = worlds.to_pandas()
     assert list(frame.columns) == ["world", *worlds.keys()]
     for world in (0, 1):

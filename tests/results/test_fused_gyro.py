@@ -16,6 +16,7 @@ from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from cmg_mj.sensors.gyros import MemsGyro
 from tests.observers.reference import DT, NOISE
+from tests.recorded import recorded
 
 GYRO = MemsGyro()
 SIGMA, WALK = GYRO.white_noise_sigma(DT), GYRO.flicker_floor
@@ -95,8 +96,7 @@ def test_on_a_rig_that_turns_the_gyro_shows_the_bodys_rate() -> None:
     perfect += ["sensors.mems_gyro.scale_error=0", "sensors.mems_gyro.counts_per_deg_s=0", "plant.turn_rate_rad_s=2"]
     setup = prepare(load_scenario("two_axes", [*perfect, "push=[]", "duration_s=0.5", "plant.initial_tilt_deg=3"]))
     result = setup.run()
-    trajectory, model = result.trajectory, setup.plant.model
-    assert trajectory is not None
+    trajectory, model = recorded(result), setup.plant.model
     data, velocity = mujoco.MjData(model), np.zeros(6)
     rates = np.stack([trajectory[name] for name in trajectory.layout.rates()], axis=-1)
     for axis in setup.plant.axes:

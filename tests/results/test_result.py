@@ -20,6 +20,7 @@ from cmg_mj.results.summary_keys import open_loop_figures
 from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
+from tests.recorded import recorded
 
 ROWS = 2 + len(BASELINES)  # of a world: two observers, and what they are judged beside
 BIASES = [0.5, 0.5, 40.0, 40.0]  # two worlds that stand, two that fall
@@ -75,9 +76,7 @@ def test_groups_are_the_worlds_in_their_order() -> None:
     assert survivors.stood.all()
     assert fallen_worlds.fell.all()
     assert fallen_worlds.mean(ERROR) is None
-    assert survivors.trajectory is not None
-    assert result().trajectory is not None
-    np.testing.assert_array_equal(survivors.trajectory["x2_rad_s"], result().trajectory["x2_rad_s"][:, :2])  # type: ignore[index]
+    np.testing.assert_array_equal(recorded(survivors)["x2_rad_s"], recorded(result())["x2_rad_s"][:, :2])
     assert survivors.seconds == 1.0 > fallen_worlds.seconds
 
 
@@ -85,10 +84,7 @@ def test_varied_rigs_are_those_of_their_own_scenarios() -> None:
     """World i at a varied setting is world i of the scenario with that setting, bit for bit."""
     alone = prepare(load_scenario("push_recovery", ["duration_s=1.0", "push=[]", "plant.equilibrium_bias_deg=1.0"]))
     batch = experiment().run_many([5, 6], settings={"equilibrium_bias_deg": np.array([0.0, 1.0])})
-    assert batch.trajectory is not None
-    rerun = alone.run(world=6).trajectory
-    assert rerun is not None
-    np.testing.assert_array_equal(batch.trajectory["x2_rad_s"][:, 1], rerun["x2_rad_s"])
+    np.testing.assert_array_equal(recorded(batch)["x2_rad_s"][:, 1], recorded(alone.run(world=6))["x2_rad_s"])
 
 
 def test_equal_settings_share_one_rig() -> None:

@@ -45,8 +45,8 @@ def assert_alike(jobs: list[BatchJob], batches: list[int], keep_trajectory: bool
 @pytest.mark.slow
 def test_every_observer_beside_the_others_is_as_by_itself(batches: list[int]) -> None:
     assert_alike([run_of(experiment(name), 3) for name in OBSERVERS], batches)
-    controllers = [experiment(name).axis_controller() for name in OBSERVERS]
-    kinds = {(controller.extra_signals[0], controller.reads_gyro) for controller in controllers}
+    axes = [experiment(name).axis_controller().axes[0] for name in OBSERVERS]
+    kinds = {(axis.extra_signals[0], axis.reads_gyro) for axis in axes}
     assert len(batches) == len(kinds) < len(OBSERVERS)  # what is estimated beyond x, and the gyro, are common
 
 

@@ -21,7 +21,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs import comparison
 from cmg_mj.runs import save as runs
 from tests.command import cmg_mj
-from tests.recorded import assert_same_bits
+from tests.recorded import assert_same_bits, recorded
 from tests.run_folders import assert_whole, names, write
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -129,8 +129,8 @@ def test_a_run_without_a_tick_can_be_written() -> None:
     """An interrupt may come before the first."""
     experiment = prepare(load_scenario(write("duration_s = 0.1")))
     result = experiment.run()
-    assert result.trajectory is not None
-    none = replace(result.trajectory, columns={name: column[:0] for name, column in result.trajectory.columns.items()})
+    whole = recorded(result)
+    none = replace(whole, columns={name: column[:0] for name, column in whole.columns.items()})
     empty = dataclasses.replace(result, trajectory=none, outcomes=[Outcome("interrupted", 0.0)])
     runs.save_run(Path("it"), runs.report_run(experiment, empty), plot=True)
     assert len(Trajectory.load(Path("it/trajectory.parquet"))) == 0

@@ -67,7 +67,7 @@ def test_turned_the_wrong_way_the_gimbals_make_the_rig_fall_at_one_radian_a_seco
     experiment = two_axes()
     assert experiment.scenario.plant.turn_rate_rad_s == 1.0
     right = experiment.plant.turning
-    experiment.plant.__dict__["turning"] = right._replace(flywheels=-right.flywheels)
+    experiment.plant.__dict__["turning"] = right._replace(flywheels=np.negative(right.flywheels).tolist())
     assert experiment.run().outcomes[0].fell
 
 

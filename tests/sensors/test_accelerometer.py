@@ -18,6 +18,7 @@ import cmg_mj
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.noise import NoiseStream
+from cmg_mj.core.sensor import Site
 from cmg_mj.core.tilt import PairTilt
 from cmg_mj.core.types import IdealReading
 from cmg_mj.plant.plant import load_plant
@@ -25,7 +26,7 @@ from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
 from cmg_mj.stages.low_pass import noise_gain
 from tests.recorded import assert_same_bits, push_recovery, recorded
-from tests.sensors.test_sampled import G, assert_sigma, measuring
+from tests.sensors.test_sampled import G, assert_sigma, readings, shown
 
 QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 TILT = PairTilt(0.06717514421272202, 0.20152543263816603)
@@ -39,7 +40,7 @@ def ideal(forces: Any) -> IdealReading:
 
 def read_forces(forces: Any, **errors: Any) -> np.ndarray:
     """Read specific forces, (4,), with parts without noise."""
-    return np.array(measuring(Accelerometer(**QUIET, **errors))(ideal(forces)))
+    return readings(Accelerometer(**QUIET, **errors), ideal(forces))[0]
 
 
 def deliver(
@@ -49,14 +50,9 @@ def deliver(
     timestep: float = MS,
     worlds: int | list[int] = 0,
 ) -> np.ndarray:
-    """The first n samples that a pair delivers of forces over time, as the controller has it work, (n, 4, ...)."""
-    pair = Sensors(accelerometer=sensor).at_work(timestep, 7, worlds)[0]
-    result = []
-    for step in range(0, n * pair.period, pair.steps_per_sample):
-        pair.sample(step, ideal(forces(step * timestep)))
-        if step % pair.period == 0:
-            result.append(np.array(pair.read(step)))
-    return np.array(result)
+    """Return the first n samples that a pair delivers of forces over time, (n, 4, ...)."""
+    pair = sensor.at_work(Site("sensors.accelerometer", timestep))
+    return shown(pair, lambda step: ideal(forces(step * timestep)), n, seed=7, worlds=worlds)
 
 
 # --- mounting and scale ------------------------------------------------------------------------------------

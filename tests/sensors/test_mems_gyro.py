@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -10,10 +11,11 @@ import pytest
 from scipy.signal import welch
 
 from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.sensor import Site
 from cmg_mj.results.baselines import GYROS, Baselines
 from cmg_mj.sensors.gyros import MemsGyro
 from tests.recorded import assert_same_bits, push_recovery, recorded
-from tests.sensors.test_sampled import assert_mean, assert_sigma
+from tests.sensors.test_sampled import assert_mean, assert_sigma, shown, turning
 
 DT = 0.005
 
@@ -24,10 +26,11 @@ def quiet(**settings: float) -> dict[str, Any]:
     return dict.fromkeys(none, 0.0) | settings
 
 
-def read_rate(rate: np.ndarray, dt: float = DT, seed: int = 0, world: int = 0, **settings: Any) -> np.ndarray:
+def read_rate(rate: np.ndarray, dt: float = DT, world: int = 0, **settings: Any) -> np.ndarray:
     """Read one world's rate with a gyro, (n,) [rad/s] -> (n,) [deg/s]."""
-    gyro = MemsGyro(**settings)
-    return np.degrees(gyro.make_reading_function(dt, normals(seed, world, 3, gyro.channels))(rate[:, None])[:, 0])
+    rates = rate.tolist()
+    gyro = MemsGyro(reading="calibrated", **settings).at_work(Site("sensors.mems_gyro", dt), dt)
+    return np.degrees(shown(gyro, lambda step: turning(rates[step]), len(rates), worlds=world)[:, 0])
 
 
 @pytest.mark.parametrize(("density", "dt", "sigma"), [(0.005, 0.005, 0.05), (0.02, 0.02, 0.1)])
@@ -102,15 +105,22 @@ def test_as_bought_it_is_offset_and_drifts_to_either_side() -> None:
     assert gyro.as_bought_drift_deg_s_k == pytest.approx(20.0 / (85.0 - 25.0), rel=0.02)
 
 
-def test_calibrated_it_is_what_it_was() -> None:
-    """The part as bought takes no number of the calibrated one's noise."""
-    gyro, rate = MemsGyro(bias_deg_s=0.1), np.random.default_rng(1).normal(size=(600, 2))
-    noise = [normals(2, [3, 8], NoiseStream.MEMS_GYRO, gyro.channels) for _ in range(2)]
-    alone = gyro.make_reading_function(DT, noise[0])(rate)
-    calibrated, as_bought = gyro.make_both(DT, noise[1], np.array([[1.0, -1.0], [1.0, -1.0]]))(rate)
-    np.testing.assert_array_equal(calibrated, alone)
-    resting = gyro.make_both(DT, normals(2, [3, 8], NoiseStream.MEMS_GYRO, gyro.channels), np.zeros((2, 2)))
-    np.testing.assert_allclose(as_bought[0] - resting(rate)[1][0], np.radians([20.0, -20.0]), atol=2e-4)
+def test_observers_read_what_the_baselines_read() -> None:
+    """To the last bit; and the part as bought takes no number of the calibrated one's noise."""
+    rate = np.random.default_rng(1).normal(size=(600, 2))
+    gyro = MemsGyro(bias_deg_s=0.1)
+
+    def both(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return gyro.make_both(DT, normals(2, [3, 8], NoiseStream.MEMS_GYRO, gyro.channels), part)(rate)
+
+    pair = both(np.array(next(normals(2, [3, 8], NoiseStream.MEMS_PART, 2))))
+    for reading, expected in zip(("calibrated", "as_bought"), pair, strict=True):
+        read = dataclasses.replace(gyro, reading=reading).at_work(Site("sensors.mems_gyro", DT), DT)
+        alone = shown(read, lambda step: turning(rate[step]), len(rate), seed=2, worlds=[3, 8])
+        np.testing.assert_array_equal(alone[:, 0], expected)
+    as_bought = both(np.array([[1.0, -1.0], [1.0, -1.0]]))[1]
+    resting = both(np.zeros((2, 2)))[1]
+    np.testing.assert_allclose(as_bought[0] - resting[0], np.radians([20.0, -20.0]), atol=2e-4)
 
 
 def test_it_is_open_loop_and_changes_nothing() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ import pytest
 from scipy import stats
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import normals
-from cmg_mj.core.sensor import Site
+from cmg_mj.core.noise import Normals, normals
+from cmg_mj.core.sensor import Sensor, Site
 from cmg_mj.core.types import IdealReading
 from cmg_mj.sensors.accelerometer import Accelerometer, Encoder
 from cmg_mj.sensors.gyros import Fog
@@ -27,22 +28,30 @@ QUIET: dict[str, Any] = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 N = 20_000
 
 
-def measuring(part: Any, noise: Any = lambda stream, channels: itertools.repeat((0.0,) * channels)) -> Any:
-    """A part that takes a sample whenever it is called with an ideal reading; by default without noise."""
-    sensor, steps = part.at_work(Site("sensors", 1.0 / part.rate_hz, noise)), itertools.count()
+def shown(
+    sensor: Sensor,
+    ideal: Callable[[int], IdealReading],
+    n: int,
+    every: int = 0,
+    seed: int = 0,
+    worlds: int | Sequence[int] = 0,
+) -> np.ndarray:
+    """Return n readings of a sensor at work, one in so many physics steps, by default in its period."""
+    every = every or sensor.period
+    tables = {stream: Normals(seed, worlds, stream, width) for stream, width in sensor.draws.items()}
+    state, result = sensor.init(ideal(0), tables), []
+    for step in range(0, n * every, math.gcd(every, sensor.steps_per_sample)):
+        if step:
+            state = sensor.sample(state, step, ideal(step), tables)
+        if step % every == 0:
+            result.append(sensor.read(state, step))
+    return np.array(result)
 
-    def measure(ideal: IdealReading) -> Any:
-        step = next(steps)
-        sensor.sample(step, ideal)
-        return sensor.read(step)
 
-    return measure
-
-
-def readings(sensor: Any, n: int, seed: int = 0, world: int = 0, ideal: IdealReading = READING_AT_REST) -> np.ndarray:
-    """n samples of one world, (n, channels)."""
-    measure = measuring(sensor, lambda stream, channels: normals(seed, world, 0, channels))
-    return np.array([np.atleast_1d(measure(ideal)) for _ in range(n)])
+def readings(part: Any, *ideals: IdealReading, n: int = 0, seed: int = 0, world: int = 0) -> np.ndarray:
+    """Return what one world's part shows of one reading after the other, (n, channels); the last one stays."""
+    sensor = part.at_work(Site("sensors", 1.0 / part.rate_hz))
+    return shown(sensor, lambda step: ideals[min(step, len(ideals) - 1)], n or len(ideals), seed=seed, worlds=world)
 
 
 def assert_sigma(values: np.ndarray, sigma: float) -> None:
@@ -71,7 +80,7 @@ def test_accelerometer_noise_is_density_times_root_of_half_the_rate(
     density_ug_rthz: float, rate_hz: float, sigma: float
 ) -> None:
     sensor = Accelerometer(rate_hz=rate_hz, noise_density_ug_rthz=density_ug_rthz, counts_per_g=0.0)
-    noise = readings(sensor, N) - [0.0, G, 0.0, G]
+    noise = readings(sensor, READING_AT_REST, n=N) - [0.0, G, 0.0, G]
     assert noise.shape == (N, 4)
     for channel in noise.T:
         assert_sigma(channel, sigma)
@@ -81,10 +90,10 @@ def test_accelerometer_noise_is_density_times_root_of_half_the_rate(
 
 def test_accelerometer_counts() -> None:
     """16384 counts a g (MPU-6050): readings are whole counts, and rounding adds step^2/12 to the variance."""
-    noise = readings(Accelerometer(), N)[:, 0]
+    noise = readings(Accelerometer(), READING_AT_REST, n=N)[:, 0]
     counts = noise * 16384.0 / G
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-6)
-    coarse = readings(Accelerometer(counts_per_g=100.0, noise_density_ug_rthz=2000.0), N)[:, 0]
+    coarse = readings(Accelerometer(counts_per_g=100.0, noise_density_ug_rthz=2000.0), READING_AT_REST, n=N)[:, 0]
     sigma, step = 2000e-6 * G * 10.0, G / 100.0
     assert_sigma(coarse, math.sqrt(sigma**2 + step**2 / 12.0))
 
@@ -93,8 +102,8 @@ def test_accelerometer_counts() -> None:
 def test_accelerometer_saturates_at_its_range(force: float, reading: float) -> None:
     ideal = IdealReading([force * G] * 4, [0.0, 0.0], 0.0, 0.0)
     for sensor in (Accelerometer(noise_density_ug_rthz=0.0), Accelerometer(range_g=2.0, **QUIET)):
-        np.testing.assert_allclose(readings(sensor, 1, ideal=ideal)[0], reading * G, rtol=1e-12)
-    noisy = readings(Accelerometer(), 500, ideal=ideal)
+        np.testing.assert_allclose(readings(sensor, ideal)[0], reading * G, rtol=1e-12)
+    noisy = readings(Accelerometer(), ideal, n=500)
     assert np.abs(noisy).max() <= 2.0 * G * (1.0 + 1e-12)
 
 
@@ -122,19 +131,23 @@ def test_accelerometer_bias_and_equilibrium_bias_move_the_loop_alike() -> None:
 def test_encoder_shows_the_nearest_count(encoder: Encoder, counts: int) -> None:
     """12 bits (AS5045), and another resolution."""
     step = 2.0 * math.pi / counts
-    measure = measuring(encoder)
-    for angle in np.linspace(-2.0, 2.0, 1001).tolist():
-        readings = measure(IdealReading((), [angle, 0.5 * angle], 0.0, 0.0))
-        for ideal, reading in zip((angle, 0.5 * angle), readings, strict=True):
-            assert abs(reading - ideal) <= step / 2.0 * (1.0 + 1e-9)
-            assert reading / step == pytest.approx(round(reading / step), abs=1e-9)
+    angles = np.outer(np.linspace(-2.0, 2.0, 1001), (1.0, 0.5))
+    shown_angles = readings(encoder, *(IdealReading((), pair, 0.0, 0.0) for pair in angles.tolist()))
+    assert np.abs(shown_angles - angles).max() <= step / 2.0 * (1.0 + 1e-9)
+    np.testing.assert_allclose(shown_angles / step, np.round(shown_angles / step), atol=1e-9)
 
 
 def test_encoder_without_resolution_is_ideal() -> None:
-    assert measuring(Encoder(counts_per_revolution=0.0))(IdealReading((), [0.1, 0.2], 0.0, 0.0)) == [0.1, 0.2]
+    angles = IdealReading((), [0.1, 0.2], 0.0, 0.0)
+    assert readings(Encoder(counts_per_revolution=0.0), angles).tolist() == [[0.1, 0.2]]
 
 
 # --- fibre-optic gyro --------------------------------------------------------------------------------------
+
+
+def turning(rate: float) -> IdealReading:
+    """Return the reading of a frame that turns at a rate [rad/s]."""
+    return IdealReading((), [], rate, rate)
 
 
 @pytest.mark.daily_cases("0.02-200.0")
@@ -144,19 +157,20 @@ def test_fog_angle_walks_randomly(walk_deg_rth: float, rate_hz: float) -> None:
     gyros, n = 400, int(0.5 * rate_hz)
     walk = math.radians(walk_deg_rth) / math.sqrt(3600.0)  # rad/sqrt(s)
     sensor = Fog(rate_hz=rate_hz, angle_random_walk_deg_rth=walk_deg_rth)
-    angles = np.array([readings(sensor, n, seed=1, world=w)[:, 0].sum() / rate_hz for w in range(gyros)])
+    angles = np.array([readings(sensor, turning(0.0), n=n, seed=1, world=w).sum() / rate_hz for w in range(gyros)])
     assert_sigma(angles, walk * math.sqrt(0.5))
     assert_mean(angles, 0.0, walk * math.sqrt(0.5))
 
 
 def test_fog_bias_and_range() -> None:
     quiet = {"angle_random_walk_deg_rth": 0.0}
-    assert readings(Fog(bias_deg_h=30.0, **quiet), 1)[0, 0] == pytest.approx(math.radians(30.0 / 3600.0), rel=1e-12)
+    assert readings(Fog(bias_deg_h=30.0, **quiet), turning(0.0)) == pytest.approx(
+        math.radians(30.0 / 3600.0), rel=1e-12
+    )
     for rate in (20.0, -20.0):
-        fast = IdealReading((), [], rate, rate)
-        reading = readings(Fog(**quiet), 1, ideal=fast)[0, 0]
+        reading = readings(Fog(**quiet), turning(rate))
         assert reading == pytest.approx(math.copysign(math.radians(490.0), rate), rel=1e-12)
-        assert readings(Fog(range_deg_s=2000.0, **quiet), 1, ideal=fast)[0, 0] == pytest.approx(rate)
+        assert readings(Fog(range_deg_s=2000.0, **quiet), turning(rate)) == pytest.approx(rate)
 
 
 @pytest.mark.parametrize(
@@ -169,33 +183,18 @@ def test_fog_bias_and_range() -> None:
 )
 def test_fog_step_response(arguments: dict[str, Any], bandwidth_hz: float, rate_hz: float) -> None:
     """A first-order low-pass: 1 - exp(-2 pi f t), the step coming right after the sample at t = 0."""
-    measure = measuring(Fog(angle_random_walk_deg_rth=0.0, **arguments))
-    reading = [measure(IdealReading((), [], 0.0 if k == 0 else 1.0, 0.0)) for k in range(30)]
+    reading = readings(Fog(angle_random_walk_deg_rth=0.0, **arguments), turning(0.0), turning(1.0), n=30)[:, 0]
     t = np.arange(30) / rate_hz
     np.testing.assert_allclose(reading, 1.0 - np.exp(-2.0 * math.pi * bandwidth_hz * t), rtol=1e-12, atol=1e-14)
 
 
 def test_fog_without_bandwidth_shows_the_step_at_once_and_starts_settled() -> None:
-    quick = measuring(Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0))
-    assert [quick(IdealReading((), [], rate, rate)) for rate in (0.3, -0.2)] == [0.3, -0.2]
-    assert measuring(Fog(angle_random_walk_deg_rth=0.0))(IdealReading((), [], 0.3, 0.3)) == 0.3
+    quick = Fog(bandwidth_hz=0.0, angle_random_walk_deg_rth=0.0)
+    assert readings(quick, turning(0.3), turning(-0.2)).tolist() == [[0.3], [-0.2]]
+    assert readings(Fog(angle_random_walk_deg_rth=0.0), turning(0.3)) == 0.3
 
 
 # --- rates and latency -------------------------------------------------------------------------------------
-
-
-def read_gyro(sensor: Fog, timestep: float, steps: int, read_every: int) -> list[float]:
-    """Readings of a gyro, at control ticks, of a rate that is the number of the physics step."""
-    sampled_gyro = sensor.at_work(
-        Site("sensors.fog", timestep, lambda stream, channels: normals(0, 0, stream, channels))
-    )
-    reading = []
-    for step in range(steps):
-        if step % sampled_gyro.period == 0:
-            sampled_gyro.sample(step, IdealReading((), [], float(step), 0.0))
-        if step % read_every == 0:
-            reading.append(sampled_gyro.read(step))
-    return reading
 
 
 COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s": 1e6}
@@ -214,8 +213,8 @@ COUNTING = {"angle_random_walk_deg_rth": 0.0, "bandwidth_hz": 0.0, "range_deg_s"
 )
 def test_newest_delivered_sample_at_each_tick(rate_hz: float, latency_s: float, expected: list[int]) -> None:
     """At 200 Hz control and 1 ms physics. Before the first delivery the rig stood still."""
-    sensor = Fog(rate_hz=rate_hz, latency_s=latency_s, **COUNTING)
-    assert read_gyro(sensor, 0.001, 26, 5) == expected
+    gyro = Fog(rate_hz=rate_hz, latency_s=latency_s, **COUNTING).at_work(Site("sensors.fog", 0.001))
+    assert shown(gyro, lambda step: turning(float(step)), 6, every=5)[:, 0].tolist() == expected
 
 
 @pytest.mark.parametrize(

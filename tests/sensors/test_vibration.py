@@ -4,42 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import NoiseStream, normals
+from cmg_mj.core.sensor import Site
 from cmg_mj.core.types import STANDARD_GRAVITY, IdealReading
 from cmg_mj.runs.experiment import Experiment
 from cmg_mj.scenario.loading import load_scenario
-from cmg_mj.sensors import Sensors
 from cmg_mj.sensors.accelerometer import Accelerometer
-from cmg_mj.stages.vibration import BroadbandVibration, WheelTones
 from tests.recorded import push_recovery, recorded
+from tests.sensors.test_sampled import shown
 
 MG = 1e-3 * STANDARD_GRAVITY
 SILENT = {"noise_density_ug_rthz": 0.0, "counts_per_g": 0.0}
 
 
-def broadband(band_hz: tuple[float, float], dt: float, n: int, worlds: int | Sequence[int] = 0) -> np.ndarray:
-    """n samples of the four axes: (n, 4[, n_worlds])."""
-    source = BroadbandVibration(band_hz, dt, normals(0, worlds, NoiseStream.VIBRATION, BroadbandVibration.channels))
-    return np.array([source.advance() for _ in range(n)])
+def shaken(n: int, dt: float = 0.005, worlds: int | Sequence[int] = 0, rates: Any = (), **fields: Any) -> np.ndarray:
+    """Return n samples of accelerometers at rest, weightless and otherwise perfect, (n, 4[, n_worlds]) [mg].
 
-
-def readings(
-    n: int, worlds: int | Sequence[int] = 0, rates: Sequence[float] = (), h: float = 0.005, **fields: object
-) -> np.ndarray:
-    """n samples of accelerometers at rest, weightless and otherwise perfect."""
-    pair, _, _ = Sensors(Accelerometer(**{**SILENT, **fields})).at_work(h, 0, worlds)
-    forces = (0.0,) * 4 if isinstance(worlds, int) else np.zeros((4, len(worlds)))
-    wheels = [rate if isinstance(worlds, int) else np.full(len(worlds), rate) for rate in rates]
-    taken = []
-    for k in range(n):
-        pair.sample(k, IdealReading(forces, [0.0], 0.0, 0.0, wheels))
-        taken.append(pair.read(k))
-    return np.array(taken)
+    Rates are those of the flywheels, one each, or a row of them a sample [rad/s].
+    """
+    pair = Accelerometer(rate_hz=1.0 / dt, **SILENT, **fields).at_work(Site("sensors.accelerometer", dt))
+    forces: Any = [0.0] * 4
+    wheels: Any = np.broadcast_to(rates, (n, np.shape(rates)[-1])).tolist()
+    if not isinstance(worlds, int):
+        forces = np.zeros((4, len(worlds)))
+        wheels = [[np.full(len(worlds), rate) for rate in row] for row in wheels]
+    return shown(pair, lambda step: IdealReading(forces, [0.0], 0.0, 0.0, wheels[step]), n, worlds=worlds) / MG
 
 
 # --- broadband -------------------------------------------------------------------------------------------------
@@ -48,7 +42,7 @@ def readings(
 @pytest.mark.parametrize(("band_hz", "dt"), [((20.0, 500.0), 0.005), ((20.0, 500.0), 1e-4), ((90.0, 110.0), 1e-3)])
 def test_the_rms_is_the_same_at_any_sample_rate(band_hz: tuple[float, float], dt: float) -> None:
     """From the first sample on; and the covariance of two samples is the band-pass'."""
-    samples = broadband(band_hz, dt, 20, range(4000))
+    samples = shaken(20, dt, range(4000), vibration_mg=1.0, vibration_band_hz=band_hz)
     assert float(samples[0].std()) == pytest.approx(1.0, rel=0.02)
     assert float(samples[-1].std()) == pytest.approx(1.0, rel=0.02)
     f = np.arange(0.005, 2e5, 0.25) if dt < 0.005 else np.arange(0.005, 1e5, 0.1)
@@ -60,19 +54,17 @@ def test_the_rms_is_the_same_at_any_sample_rate(band_hz: tuple[float, float], dt
 
 
 def test_axes_vibrate_each_by_itself() -> None:
-    samples = broadband((20.0, 500.0), 0.005, 1, range(4000))[0]
+    samples = shaken(1, worlds=range(4000), vibration_mg=1.0)[0]
     np.testing.assert_allclose(np.corrcoef(samples), np.eye(4), atol=0.06)
 
 
 def test_accelerometers_show_it_in_mg() -> None:
-    samples = readings(20, range(2000), vibration_mg=4.0)
-    assert float(samples.std()) == pytest.approx(4.0 * MG, rel=0.02)
+    assert float(shaken(20, worlds=range(2000), vibration_mg=4.0).std()) == pytest.approx(4.0, rel=0.02)
 
 
 def test_one_world_of_many_vibrates_as_alone() -> None:
-    fields = {"vibration_mg": 4.0, "wheel_harmonics_mg": (5.0, 0.0, 2.0)}
-    alone = readings(40, 3, (314.0, -313.0), **fields)
-    many = readings(40, [1, 3, 2], (314.0, -313.0), **fields)
+    fields = {"rates": (314.0, -313.0), "vibration_mg": 4.0, "wheel_harmonics_mg": (5.0, 0.0, 2.0)}
+    alone, many = (shaken(40, worlds=worlds, **fields) for worlds in (3, [1, 3, 2]))
     np.testing.assert_array_equal(many[:, :, 1], alone)
 
 
@@ -80,9 +72,8 @@ def test_one_world_of_many_vibrates_as_alone() -> None:
 
 
 def tone(rates: np.ndarray, dt: float, harmonics: Sequence[float] = (1.0,)) -> np.ndarray:
-    """The first axis' samples with one wheel at these rates."""
-    source = WheelTones(harmonics, dt, normals(0, 0, NoiseStream.WHEEL_TONES, 2))
-    return np.array([source.advance([rate])[0] for rate in rates.tolist()])
+    """Return the first axis' samples with one wheel at these rates [mg]."""
+    return shaken(len(rates), dt, rates=rates[:, None], wheel_harmonics_mg=tuple(harmonics))[:, 0]
 
 
 def strongest(samples: np.ndarray, dt: float) -> float:

@@ -19,11 +19,6 @@ from cmg_mj.plant.mjcf import data_at_keyframe
 from cmg_mj.plant.tilt_line import HingeLine
 from cmg_mj.scenario.plant_settings import PlantSettings
 
-STEP_SHARE = 0.25
-"""Physics step times the mode's angular frequency, at most.
-
-RK4 is then 3.3e-5 slow (z^4/120) and takes z^5/72 = 1.4e-5 of the mode's energy a radian.
-"""
 RIGID_SHARE = 0.999
 """Largest share of the frame's own inertia on one side of the bend: a part without mass does not move."""
 
@@ -104,7 +99,12 @@ def _refuse_torques_of_hinge(
     rigid: mujoco.MjModel, line: HingeLine, settings: PlantSettings, section: Bend, path: Path
 ) -> None:
     """Refuse what the model's file has at the tilt's hinge, which would act on the modules, beyond the bend."""
-    # The settings' own friction and damping replace the file's; `limit_step` refuses those.
+    for name in ("tilt_friction_n_m", "tilt_damping_n_m_s"):  # these replace the file's
+        if value := getattr(settings, name):
+            raise InputError(
+                f"plant.{name} = {value:g}: {path}: acts on the part with the modules, which lies beyond the bend with "
+                f"bend.beyond = {section.beyond!r}; leave it out, or take bend.beyond = 'sensors'"
+            )
     torques = {
         "damping": settings.tilt_damping_n_m_s is None and rigid.dof_damping[line.dof],
         "frictionloss": settings.tilt_friction_n_m is None and rigid.dof_frictionloss[line.dof],
@@ -120,45 +120,6 @@ def _refuse_torques_of_hinge(
                 f"{rigid.joint(line.joint).name!r} would act on the part with the modules, beyond the bend; "
                 f"{cures.get(attribute, 'take it out of the file')}, or take bend.beyond=sensors"
             )
-
-
-def limit_step(section: Bend, settings: PlantSettings, step: float, path: Path) -> float:
-    """Return the longest physics step that follows the mode, and settings that go together with it.
-
-    Args:
-        section: The mode.
-        settings: The plant's settings.
-        step: The longest step without a bend [s].
-        path: The model's file, for messages.
-
-    Returns:
-        The step; of a rigid frame the one that was given [s].
-
-    Raises:
-        InputError: A step is named that does not follow the mode, an integrator that does not, or friction of a tilt
-            joint that is beyond the bend.
-    """
-    if not section.frequency_hz:
-        return step
-    hz = f"{section.frequency_hz:g}"
-    longest = STEP_SHARE / (2.0 * math.pi * section.frequency_hz)
-    if settings.timestep_s is not None and settings.timestep_s > longest * (1.0 + 1e-9):
-        raise InputError(
-            f"plant.timestep_s = {settings.timestep_s:g}: does not follow a bend of {hz} Hz, which takes at most "
-            f"{longest:.3g} s (omega h <= {STEP_SHARE:g}); leave it out"
-        )
-    if settings.integrator != "RK4":
-        raise InputError(
-            f"plant.integrator = {settings.integrator!r}: follows no bend (bend.frequency_hz = {hz}) to 0.1 %; take RK4"
-        )
-    for name in ("tilt_friction_n_m", "tilt_damping_n_m_s"):
-        value = getattr(settings, name)
-        if value and section.beyond != "sensors":
-            raise InputError(
-                f"plant.{name} = {value:g}: {path}: acts on the part with the modules, which lies beyond the bend with "
-                f"bend.beyond = {section.beyond!r}; leave it out, or take bend.beyond = 'sensors'"
-            )
-    return min(step, longest)
 
 
 def mode_inertia(model: mujoco.MjModel, key: int, line: HingeLine, *, slides: bool) -> float:

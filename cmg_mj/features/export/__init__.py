@@ -56,16 +56,11 @@ def export(
     return write_code(out, generate_code(control, precision, name))
 
 
-def generate_code(
-    controller: AxisControl, precision: Literal["double", "single"], name: str | None = None, suffix: str = ""
-) -> Code:
-    """Generate a controller's C and compare it with Python, as `export` does, without writing it.
-
-    Its name has a suffix, which tells a plugin's axes apart.
-    """
+def generate_code(controller: AxisControl, precision: Literal["double", "single"], name: str | None = None) -> Code:
+    """Generate a controller's C and compare it with Python, as `export` does, without writing it."""
     from cmg_mj.features.export import pipeline
 
-    return pipeline.generate_code(controller, precision, name, suffix)
+    return pipeline.generate_code(controller, precision, name)
 
 
 def write_code(out: Path | RunFolder, code: Code) -> list[Path]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import shlex
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,11 +16,11 @@ from cmg_mj.core.errors import InputError, raised, shown
 from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import check
 from cmg_mj.features.export.c_code import Precision
-from cmg_mj.features.export.c_files import CodePrinter, LawPrinter, format_example, format_test_vector
+from cmg_mj.features.export.c_files import CodePrinter, format_example, format_test_vector
 from cmg_mj.features.export.compiler import find_compiler
-from cmg_mj.features.export.constants import class_path, constants_of
+from cmg_mj.features.export.constants import Constants, class_path, constants_of
 from cmg_mj.features.export.names import name_of
-from cmg_mj.features.export.trace import LawNotExportable, trace
+from cmg_mj.features.export.trace import LawNotExportable, Traced, trace
 from cmg_mj.results.folder import write_text
 from cmg_mj.stages.notch import Notch
 from cmg_mj.stages.trim import Trim
@@ -30,19 +32,35 @@ class Code(NamedTuple):
     Attributes:
         files: Name -> text.
         figures: Its sizes and differences from Python, as `--json` prints them.
-        law: The printer of the law's part, for C that is joined to it.
     """
 
     files: dict[str, str]
     figures: dict[str, Any]
-    law: LawPrinter
 
 
-def generate_code(controller: AxisControl, precision: Precision, name: str | None = None, suffix: str = "") -> Code:
-    """Generate a controller's C, whose name has a suffix, and compare it with Python; see `export`."""
+def generate_code(controller: AxisControl, precision: Precision, name: str | None = None) -> Code:
+    """Generate a controller's C and compare it with Python; see `export`."""
     require_exportable(controller)
+    with _named(controller):
+        return _generate(controller, precision, name_of(controller.observer, name))
+
+
+def require_traceable(controller: AxisControl) -> None:
+    """Refuse an observer or a law that no formula expresses; all else of the controller is left out.
+
+    Raises:
+        InputError: It is none.
+    """
+    trims = tuple(stage for stage in controller.memories if isinstance(stage, Trim))
+    with _named(controller):
+        _traced(replace(controller, commands=(), memories=trims))
+
+
+@contextmanager
+def _named(controller: AxisControl) -> Iterator[None]:
+    """Name the observer or the law in an error."""
     try:
-        return _generate(controller, precision, name_of(controller.observer, name) + suffix)
+        yield
     except LawNotExportable as error:
         raise InputError(f"law {type(controller.law).__name__}: cannot be exported: {error}") from error
     except InputError as error:
@@ -74,12 +92,16 @@ def _copied(part: Any, refusal: type[InputError]) -> Any:
         raise refusal(f"it cannot be copied: {raised(error)}") from error
 
 
-def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
+def _traced(controller: AxisControl) -> tuple[Traced, Constants, float]:
+    """Trace a controller; return the formulas, their constants, and their difference from Python."""
     for_trace, law_for_trace = _copied(controller.observer, InputError), _copied(controller.law, LawNotExportable)
     constants = constants_of(controller)
     traced = trace(for_trace, law_for_trace, constants)
-    off = check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
+    return traced, constants, check.check_trace(controller, traced, constants, seeds=(1, 2, 3))
 
+
+def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
+    traced, constants, off = _traced(controller)
     printer = CodePrinter(controller, traced, constants, precision, name)
     samples = check.signals(controller, 0, precision)
     expected = check.in_python(controller, samples)
@@ -115,7 +137,7 @@ def _generate(controller: AxisControl, precision: Precision, name: str) -> Code:
             off_by = figures["c_off_by"] = check.check_c(Path(temporary), name, compiler)
         bounds = zip(check.columns(controller), check.rounded(controller, expected, precision), strict=True)
         figures["beyond_rounding"] = [name for name, bound in bounds if off_by[name] > bound]
-    return Code(files, figures, printer.law)
+    return Code(files, figures)
 
 
 def export_table(figures: Mapping[str, Any]) -> str:

@@ -8,9 +8,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.loop import Joints
-from cmg_mj.features.gait import Gait
-from cmg_mj.features.gait.legs import SIDES
-from cmg_mj.features.gait.walk import planned
+from cmg_mj.features.gait.legs import SIDES, Walk
 from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.plant import Plant
 from cmg_mj.results.summary_keys import Figures
@@ -24,14 +22,13 @@ class WalkFigures:
     """Sums over the ticks of one or many worlds.
 
     Args:
-        gait: The gait.
+        walk: The plan.
         plant: The robot.
         n_worlds: Number of worlds.
         dt: Control period [s].
     """
 
-    def __init__(self, gait: Gait, plant: Plant, n_worlds: int, dt: float) -> None:
-        walk = planned(plant, gait)
+    def __init__(self, walk: Walk, plant: Plant, n_worlds: int, dt: float) -> None:
         self._lands, self._dt = np.array([step.lands for step in walk.plan.steps]), dt
         self._place = int(plant.filed.model.jnt_qposadr[_free_joint(plant)])
         self._actuators = {"gimbal": [servo for axis in plant.axes for servo in axis.servos], "leg": list(walk.servos)}
@@ -65,20 +62,13 @@ class WalkFigures:
         return {"steps": steps, "distance_m": way, **each}
 
 
-def walk_figures(gait: Gait, plant: Plant, n_worlds: int, dt: float) -> WalkFigures | None:
-    """Make the figures of a walk; None without steps."""
-    return WalkFigures(gait, plant, n_worlds, dt) if gait.steps else None
-
-
-def walk_series(gait: Gait, plant: Plant) -> Callable[[Axis, Trajectory], dict[str, np.ndarray]] | None:
-    """Make the plan's lines of a recording; None without steps.
+def walk_series(walk: Walk, plant: Plant) -> Callable[[Axis, Trajectory], dict[str, np.ndarray]]:
+    """Make the plan's lines of a recording.
 
     Returns:
         Function of an axis and a trajectory: places across the axis [m] and shares of the weight, (n_ticks,) each.
     """
-    if not gait.steps:
-        return None
-    walk, name = planned(plant, gait), plant.filed.model.joint(_free_joint(plant)).name
+    name = plant.filed.model.joint(_free_joint(plant)).name
     loads = walk.plan.load(walk.time)
 
     def series(axis: Axis, trajectory: Trajectory) -> dict[str, np.ndarray]:

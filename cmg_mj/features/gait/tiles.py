@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.noise import NoiseStream
 from cmg_mj.features.gait import Gait
 from cmg_mj.plant.axis import ResolvedModel
@@ -46,12 +47,37 @@ def lay_tiles(
     return lambda model: None
 
 
-def with_heights(gait: Gait, plant: Plant, seed: int, world: int) -> Plant:
-    """Return the plant with the tiles' heights of a world, each between 0 and the largest."""
-    if not gait.tiles_m:
-        return plant
-    own = plant.with_own_model()
-    tiles = [i for i in range(own.model.ngeom) if own.model.geom(i).name.startswith("tile/")]
-    generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(world, NoiseStream.FLOOR)))
-    own.model.geom_pos[tiles, 2] = generator.uniform(0.0, gait.tiles_m, len(tiles)) - DEPTH_M / 2.0
-    return own
+class TiledFloor(Disturbance):
+    """A floor whose tiles have heights of their own in each world, each between 0 and the largest.
+
+    Args:
+        largest_m: Largest height [m].
+        seed: The run's seed.
+        worlds: The worlds' numbers.
+    """
+
+    def __init__(self, largest_m: float, seed: int, worlds: Sequence[int]) -> None:
+        self._largest, self._seed, self._worlds = largest_m, seed, worlds
+
+    def placed(self, plants: Sequence[Plant]) -> Sequence[Plant]:
+        """See `Disturbance`."""
+        return [self._laid(plant, world) for plant, world in zip(plants, self._worlds, strict=True)]
+
+    def _laid(self, plant: Plant, world: int) -> Plant:
+        own = plant.with_own_model()
+        tiles = [i for i in range(own.model.ngeom) if own.model.geom(i).name.startswith("tile/")]
+        generator = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(world, NoiseStream.FLOOR)))
+        own.model.geom_pos[tiles, 2] = generator.uniform(0.0, self._largest, len(tiles)) - DEPTH_M / 2.0
+        return own
+
+    def at(self, step: int, steps: int) -> Outside:
+        """See `Disturbance`: nothing moves."""
+        return Outside()
+
+
+def tiled_floor(
+    gaits: Sequence[Gait], plants: Sequence[Plant], seed: int, world_ids: int | Sequence[int]
+) -> TiledFloor | None:
+    """Make the floor; None without tiles."""
+    worlds = [world_ids] if isinstance(world_ids, int) else world_ids
+    return next((TiledFloor(gait.tiles_m, seed, worlds) for gait in gaits if gait.tiles_m), None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -19,12 +19,15 @@ from cmg_mj.core.rig import AxesOrders, AxesStage
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import MultiAxisReading
 from cmg_mj.features.gait import Gait
+from cmg_mj.features.gait.figures import WalkFigures, walk_series
 from cmg_mj.features.gait.lean import Lean, Leaning
 from cmg_mj.features.gait.legs import SIDES, Walk, plan_walk
 from cmg_mj.features.gait.plan import Plan
 from cmg_mj.features.gait.switches import Foot, FootSwitches, foot_switches
 from cmg_mj.inputs.features import Judgement
+from cmg_mj.plant.axis import Axis
 from cmg_mj.plant.plant import Plant
+from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.scenario.design import Design
 from cmg_mj.scenario.schema import Scenario
 
@@ -112,7 +115,7 @@ def walking(gait: Gait, plant: Plant, axes: Sequence[AxisControl]) -> Walking | 
     model = plant.filed.model
     sensors = [model.sensor(i).name for i in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)]
     feet = [sensors.index(f"{side}/foot") for side in SIDES]
-    return Walking(walk.servos.tolist(), feet, foot_switches(gait, dt), lean, models, limits, dt, course)
+    return Walking(walk, feet, foot_switches(gait, dt), lean, models, limits, dt, course)
 
 
 class Course:
@@ -182,17 +185,17 @@ class Walking(AxesStage):
     the legs' servos run straight from tick to tick: their controls are the rates (`<intvelocity>`).
 
     Attributes:
-        servos: The legs' servos.
+        walk: The plan, with the legs' servos.
         feet: Which of the touch sensors are the feet's.
         switches: The foot switches.
         lean: Finds the equilibrium bias, and moves the torso.
         models: The reduced model of each axis.
         limits: Largest gimbal rate of each axis [rad/s].
         dt: Control period [s].
-        course: The plan.
+        course: The plan as a table.
     """
 
-    servos: Sequence[int]
+    walk: Walk
     feet: Sequence[int]
     switches: FootSwitches
     lean: Lean
@@ -204,7 +207,7 @@ class Walking(AxesStage):
     @property
     def actuators(self) -> Sequence[int]:
         """See `AxesStage`."""
-        return self.servos
+        return self.walk.servos.tolist()
 
     @property
     def draws(self) -> Mapping[int, int]:
@@ -215,6 +218,14 @@ class Walking(AxesStage):
     def tables(self) -> dict[str, Course]:
         """See `AxesStage`."""
         return {"walk": self.course}
+
+    def sums(self, plant: Plant, n_worlds: int) -> WalkFigures:
+        """See `AxesStage`: steps, distance, energy."""
+        return WalkFigures(self.walk, plant, n_worlds, self.dt)
+
+    def series(self, plant: Plant) -> Callable[[Axis, Trajectory], dict[str, np.ndarray]]:
+        """See `AxesStage`: the plan beside what came of it."""
+        return walk_series(self.walk, plant)
 
     def init(self, readings: MultiAxisReading, tables: Tables) -> WalkMemory:
         """Return the memory before the first tick."""
@@ -263,7 +274,7 @@ class Walking(AxesStage):
     def _legs(self, ends: Sequence[Sequence[float]], before: Sequence[Scalar], after: Sequence[Scalar]) -> list[Scalar]:
         """Return the rates at which the servos' setpoints run until the next tick."""
         rates = []
-        n = len(self.servos)
+        n = len(self.walk.servos)
         for i in range(n):
             begin, end = (
                 plan[i] + lean[0] * plan[n + i] + lean[1] * plan[2 * n + i]

@@ -101,6 +101,10 @@ class ScissoredPairEnv(gymnasium.Env):
         bounds = np.array([math.pi, *[MAX_READING] * (1 + len(self._readings))])
         self.observation_space = gymnasium.spaces.Box(-bounds, bounds, dtype=np.float64)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is copied and pickled, in the middle of an episode too: all but what draws."""
+        return {**self.__dict__, "_renderer": None}
+
     @quiet()
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -144,8 +148,8 @@ class ScissoredPairEnv(gymnasium.Env):
         scenario = part.scenario.model_copy(update={"seed": seed, "open_loop_observers": []})
         plant, timestep = experiment.plant, experiment.plant.timestep
         acting = disturbances(outsides(scenario), [plant], seed, self._world)
-        if any(one.accelerates for one in acting):
-            plant = plant.with_own_model()
+        for one in acting:
+            (plant,) = one.placed([plant])
         self._physics = OneWorld(plant)
         self._controller = dataclasses.replace(part.design, scenario=scenario).controller(
             part.plant.interface, world_ids=self._world

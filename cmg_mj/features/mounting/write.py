@@ -16,7 +16,6 @@ from cmg_mj.features.mounting.limits import PUSH_S, PairDemands, PushLimits, pai
 from cmg_mj.features.mounting.mount import PLUGIN, MountedRobot, check_target, mount, with_scenario
 from cmg_mj.features.mounting.push import SimulatedPush, TimeLimit, simulated_push
 from cmg_mj.features.plugin.make import Plugin, make_plugin, require_tools, write_plugin
-from cmg_mj.features.plugin.tables import NAMES_IN_USE
 from cmg_mj.inputs.files import expanded
 from cmg_mj.inputs.overrides import assign
 from cmg_mj.observers import OBSERVER_CLASSES
@@ -215,5 +214,5 @@ def plugin_name(target: Path) -> str:
     """Name a plugin after a model's file, in letters, digits and _: `my robot.xml` has my_robot."""
     words = re.sub(r"[^A-Za-z0-9]+", "_", target.stem, flags=re.ASCII).strip("_")
     name = words if words[:1].isalpha() else f"robot_{words}".rstrip("_")
-    taken = {name, name.lower()} & (RESERVED | NAMES_IN_USE)
+    taken = {name, name.lower()} & RESERVED
     return f"{name}_robot" if taken else name[:LONGEST]

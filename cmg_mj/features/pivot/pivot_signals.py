@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from cmg_mj.core.arrays import Scalar
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.core.noise import NoiseStream, normals
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.pivot_track import read_track
@@ -131,7 +132,7 @@ def pivot_signal(pivot: Pivot, number: int, seed: int, world_ids: int | Sequence
     return mean
 
 
-class PivotSignals:
+class PivotSignals(Disturbance):
     """The acceleration of the pivot in time, the sum of all motions; as a disturbance its mean until the next instant.
 
     Args:
@@ -142,10 +143,6 @@ class PivotSignals:
         timestep: Physics step of the disturbance [s].
     """
 
-    edges: Sequence[int] = ()
-    accelerates = True
-    actuators: Sequence[int] = ()
-
     def __init__(
         self,
         pivots: Sequence[Pivot],
@@ -155,8 +152,13 @@ class PivotSignals:
         timestep: float = 0.0,
     ) -> None:
         self._timestep = timestep
+        self._made_from = pivots, directions, seed, world_ids, timestep
         signals = [pivot_signal(pivot, i, seed, world_ids) for i, pivot in enumerate(pivots)]
         self._parts = list(zip(signals, directions, strict=True))
+
+    def __reduce__(self) -> tuple:
+        """Copy and pickle what it was made from: it is a function of time."""
+        return PivotSignals, self._made_from
 
     def mean(self, start: float, end: float) -> list[Scalar]:
         """Compute the mean acceleration over an interval of the run [s]: x, y, z, each (n_worlds,) if it differs."""
@@ -165,6 +167,10 @@ class PivotSignals:
             acceleration = signal(start, end)
             total = [part + along * acceleration for part, along in zip(total, direction, strict=True)]
         return total
+
+    def placed(self, plants: Sequence[Any]) -> Sequence[Any]:
+        """See `Disturbance`: gravity changes; many worlds have their own of the batch."""
+        return [plants[0].with_own_model()] if len(plants) == 1 else plants
 
     def at(self, step: int, steps: int) -> Outside:
         """Return the acceleration: see `Disturbance`."""

@@ -14,14 +14,15 @@ from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import ControlLoop
 from cmg_mj.core.types import as_estimate
 from cmg_mj.features.plugin.model import INSTANCE, mujoco_library
-from cmg_mj.features.plugin.sensors import check_noise
 from cmg_mj.plant.mjcf import OWN
 from cmg_mj.plant.physics import OneWorld
 
 SEED, WORLD, STATUS, STEPS = range(4)
-"""Places in an instance's state, as state.h numbers them."""
+"""Places in an instance's state, as rig.h numbers them."""
 FAILED = 2.0
-"""A status, as state.h numbers it."""
+"""A status, as rig.h numbers it."""
+MAX_SEED = 2**53
+"""Seeds and worlds lie in the plugin's state, whose numbers are doubles."""
 
 
 class PluginLoop(ControlLoop):
@@ -53,6 +54,17 @@ def _decided(tick: Tick, data: mujoco.MjData, prefix: str) -> Tick:
     (u,), (x_e,) = shown("command"), shown("integrator")
     estimates = [as_estimate(shown("estimate")), *tick.estimates[1:]]
     return tick._replace(y1=y1, y2=y2, acceleration=acceleration, u=u, x_e=x_e, estimates=estimates)
+
+
+def check_noise(seed: float, world: float) -> None:
+    """Refuse a seed or world that no plugin's state holds.
+
+    Raises:
+        InputError: It is out of range, or no whole number.
+    """
+    for name, number in (("seed", seed), ("world", world)):
+        if not 0 <= number <= MAX_SEED or number != int(number):
+            raise InputError(f"{name} = {number}: a plugin takes {name}s from 0 to 2^53, as whole numbers")
 
 
 def set_world(model: mujoco.MjModel, data: mujoco.MjData, seed: int, world: int) -> None:

@@ -14,13 +14,22 @@ from typing import Any, Literal, NamedTuple, Unpack
 import mujoco
 
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.rig import RigControl
 from cmg_mj.features.export.compiler import find_compiler
 from cmg_mj.features.export.names import name_of
+from cmg_mj.features.export.pipeline import require_traceable
 from cmg_mj.features.plugin.driver import PluginLoop
 from cmg_mj.features.plugin.model import plugin_mjcf
-from cmg_mj.features.plugin.sensors import PluginAxis, PluginRig
-from cmg_mj.features.plugin.tables import PluginCode, check_platform, compile_plugin, generate_plugin, library_name
-from cmg_mj.linear.verdict import SIMULATED, omissions, require_stable_period
+from cmg_mj.features.plugin.tables import (
+    PluginCode,
+    PluginRig,
+    check_platform,
+    compile_plugin,
+    generate_plugin,
+    library_name,
+)
+from cmg_mj.inputs.features import FEATURES
+from cmg_mj.linear.verdict import require_stable_period
 from cmg_mj.plant.mjcf import set_control_callback
 from cmg_mj.results.folder import RunFolder, claimed, write_text
 from cmg_mj.results.result import Result
@@ -124,21 +133,21 @@ def describe_rig(experiment: Experiment, name: str, world: int = 0) -> PluginRig
     """Describe an experiment's rig and its controllers.
 
     Raises:
-        InputError: The scenario has an imperfection that no plugin has.
+        InputError: The scenario has something from outside that no plugin has, or an observer or law is no formula.
     """
-    axes = []
+    controls = []
     for i, part in enumerate(experiment.axes):
-        for field, clause in omissions(part.scenario).items():
-            if field not in SIMULATED:
-                raise InputError(f"{field}: {clause}: a plugin does not have it")
-        axis = part.plant.axis
-        modules = tuple((module.name, module.direction, module.speed, module.gimbal_zero) for module in axis.modules)
-        controller = part.design.axis_control(part.plant.interface, axis=i)
-        joint = mujoco.mj_id2name(part.plant.model, mujoco.mjtObj.mjOBJ_JOINT, axis.line.joint)
-        axes.append(PluginAxis(axis.prefix, modules, joint, tuple(axis.line.push[1]), controller))
-    compensates = len(axes) > 1 and experiment.scenario.controller.compensate_turning
-    turning = (experiment.plant.turning, experiment.scenario.sensors.mems_gyro) if compensates else None
-    return PluginRig(axes, f"cmg_mj.{name}", experiment.scenario.seed, world, turning)
+        for section, settings in part.scenario.feature_sections.items():
+            words = next((one.unmodelled for one in settings if one.unmodelled), "")
+            feature = FEATURES[section]
+            if words and (feature.disturbance or feature.between):
+                raise InputError(f"{section}: {words}: a plugin does not have it")
+        control = part.design.axis_control(part.plant.interface, axis=i, open_loop_observers=())
+        require_traceable(control)
+        controls.append(control)
+    between = tuple(experiment.between(controls))
+    control = RigControl(tuple(controls), between)
+    return PluginRig(experiment.plant, control, f"cmg_mj.{name}", experiment.scenario.seed, world)
 
 
 def write_plugin(made: PluginCode, out: Path | RunFolder) -> Plugin:

@@ -1,44 +1,65 @@
-"""Generates a plugin's C: exported controllers, what joins them to the plugin, the rig's numbers, the common files.
-
-Compiles it, and prints what stands beside it.
-"""
+"""Prints a plugin's C and what stands beside it: the recorded rig, the common files; and compiles it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import platform
 import shlex
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.noise import NoiseStream
-from cmg_mj.core.types import reads_gyro
+from cmg_mj.core.rig import RigControl
+from cmg_mj.core.sensor import all_draws
 from cmg_mj.features.export import compiler as c_compiler
-from cmg_mj.features.export import generate_code
-from cmg_mj.features.plugin.sensors import (
-    PluginAxis,
-    PluginRig,
-    Value,
-    clock_of,
-    describe_axis,
-    describe_mems_gyro,
-    refuse_unsupported,
+from cmg_mj.features.plugin.driver import check_noise
+from cmg_mj.features.plugin.model import QUANTITIES
+from cmg_mj.features.plugin.recording import (
+    RecordedRig,
+    RecordedSensor,
+    Recorder,
+    c_text,
+    generator,
+    record,
+    settings_of,
 )
-from cmg_mj.stages.trim import trim_of
+from cmg_mj.plant.plant import Plant
 
-if TYPE_CHECKING:
-    from cmg_mj.features.export.c_files import LawPrinter
+SHOWN = 5
+"""Numbers that are shown of an axis before its estimate."""
+NOISE_WORDS = 8
+"""Numbers of a noise stream's generator."""
+BUILD = "@BUILD@"
+"""Stands for the code's fingerprint until that is known."""
 
 
-COMMON_SOURCES = ("noise.c", "sensors.c", "gyros.c", "controller.c", "state.c", "setup.c", "plugin.c")
-COMMON_HEADERS = ("ziggurat.h", "noise.h", "sensors.h", "gyros.h", "controller.h", "rig.h", "state.h", "setup.h")
+class PluginRig(NamedTuple):
+    """A rig with its controllers.
+
+    Attributes:
+        plant: The plant.
+        control: The controllers of its axes, and what stands between them.
+        plugin: Name under which MuJoCo knows the plugin.
+        seed: Seed of its noise.
+        world: The world whose noise it has.
+    """
+
+    plant: Plant
+    control: RigControl
+    plugin: str
+    seed: int
+    world: int
+
+
+COMMON_SOURCES = ("noise.c", "state.c", "setup.c", "plugin.c")
+COMMON_HEADERS = ("ziggurat.h", "noise.h", "rig.h", "setup.h")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 TESTED_PLATFORM = ("Linux", "glibc")
 FOLDER = files("cmg_mj.features.plugin")
@@ -123,21 +144,6 @@ def extra_files(name: str, code: Collection[str], sources: Sequence[str], prefix
     return result
 
 
-def c_text(text: str) -> str:
-    """Print a text as C reads it; in octal whatever is no plain letter, and ?, which begins trigraphs."""
-    letters = (chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode())
-    return f'"{"".join(letters)}"'
-
-
-NAMES_IN_USE = frozenset(
-    """
-    axis controller decision delivery encoder fog gyros law measure module noise observer pair plugin rig sensor sensors
-    setup show spin state mems_gyro turning ziggurat
-    """.split()  # noqa: SIM905
-)
-"""Names that would clash with the C that all plugins have in common."""
-
-
 class PluginCode(NamedTuple):
     """A plugin before it is compiled.
 
@@ -159,192 +165,111 @@ def generate_plugin(rig: PluginRig, name: str) -> PluginCode:
 
     Args:
         rig: The rig with its controllers.
-        name: Prefix of the exported controllers in C; of several axes the axis' number follows.
+        name: The plugin's name behind `cmg_mj.`.
 
     Returns:
         The code.
 
     Raises:
-        InputError: Something in use cannot be exported, or the name is none for a plugin.
+        InputError: Something in use cannot be recorded.
     """
-    refuse_unsupported(rig)
-    if name in NAMES_IN_USE:
-        raise InputError(f"--name {name}: is a name in every plugin's C; take another, such as {name}_of_mine")
-    files, names = common_files(), []
-    for number, axis in enumerate(rig.axes):
-        suffix = f"_{number}" if len(rig.axes) > 1 else ""
-        own = name + suffix
-        controller = replace(axis.controller, feedback="observer")  # the plugin's own C chooses the rate
-        code = generate_code(controller, "double", name, suffix)
-        files |= {file: code.files[file] for file in (f"{own}.h", f"{own}.c")}
-        files[f"{own}_controller.c"] = format_controller(own, axis, code.figures["numbers_in_state"], code.law)
-        names.append(own)
-    files["rig.c"] = format_rig(rig, names, "")
+    check_noise(rig.seed, rig.world)
+    recorded = record(rig.control, rig.plant)
+    files = common_files()
+    files["rig.c"] = format_rig(rig, recorded)
     build = hashlib.sha256("".join(files.values()).encode()).hexdigest()[:16]
-    files["rig.c"] = format_rig(rig, names, build)
-    sources = [*COMMON_SOURCES, *(f"{own}_controller.c" for own in names), "rig.c"]
-    return PluginCode(name, files | extra_files(name, files, sources, rig.axes[0].prefix), sources, build)
+    files["rig.c"] = files["rig.c"].replace(BUILD, build)
+    sources = [*COMMON_SOURCES, "rig.c"]
+    prefix = rig.plant.axes[0].prefix
+    return PluginCode(name, files | extra_files(name, files, sources, prefix), sources, build)
 
 
-def format_controller(name: str, axis: PluginAxis, observer_numbers: int, law: LawPrinter) -> str:
-    """Print NAME_controller.c, which joins an exported controller to the plugin.
-
-    Args:
-        name: Name of the export.
-        axis: The axis with the controller.
-        observer_numbers: Numbers in the exported observer's state.
-        law: The printer of its law.
-
-    Returns:
-        The text.
-    """
-    controller = axis.controller
-    y = "y[0], y[1], y[2], y[3]" if reads_gyro(controller.observer) else "y[0], y[1], y[2]"
-    n, trim, formulas = name, trim_of(controller), law.law
-    gap = controller.plant.backlash
-    trimmed = -(-trim.until // controller.period)
-    fields = {
-        "estimates": 3 + len(controller.extra_signals[0]),
-        "observer": max(1, observer_numbers),
-        "law": max(1, formulas.numbers),
-        "integrator": formulas.numbers - 1 if formulas.has_integrator else -1,
-        "trimmed": trimmed,
-        "trim_part": trim.part if trimmed else 0,
-        "trim_gain": trim.gain if trimmed else 0.0,
-        "angles_are_estimated": int(controller.angle_source == "estimated"),
-        "reads_gyro": int(reads_gyro(controller.observer)),
-        "rate_limit": controller.law.rate_limit,
-        "has_backlash": int(gap > 0.0),
-        "half_gap": gap / 2.0,
-        "period": controller.law.dt,
-    }
-    return f"""/* {n} as the plugin calls it. The exported code is included: its functions are static. */
-#include "{n}.c"
-
-#include "controller.h"
-
-#include <string.h>
-
-static void controller_measure(const double *forces, const double *encoders, double y[3])
-{{
-    measure(forces, encoders, &y[0], &y[1], &y[2]);
-}}
-
-static void observer_init(double *memory, const double y[4])
-{{
-    {n}_state state = {{0}};
-    {n}_init(&state, {y});
-    memcpy(memory, &state, sizeof state);
-}}
-
-static void observer_step(double *memory, const double y[4], double u, double *estimate)
-{{
-    {n}_state state;
-    memcpy(&state, memory, sizeof state);
-    {n}_step(&state, {y}, u, estimate);
-    memcpy(memory, &state, sizeof state);
-}}
-
-{_law_functions(law)}
-extern const controller_type {n}_controller_type;
-const controller_type {n}_controller_type = {{
-{_fields(fields)}    .feedback = FEEDBACK_{controller.feedback.upper()},
-    .measure = controller_measure,
-    .observer_init = observer_init,
-    .observer_step = observer_step,
-    .law_init = law_init,
-    .law_step = law_step,
-}};
-"""
-
-
-def _law_functions(law: LawPrinter) -> str:
-    """Print law_init and law_step, which call the exported law."""
-    formulas, memory = law.law, "memory"
-    if formulas.state:
-        memory = f"&memory[{len(formulas.state)}]"
-    places = {name: f"y[{i}]" for i, name in enumerate(("y1", "y2", "acceleration"))}
-    init = "memory[0] = 0.0 * y[0];" if formulas.is_state_feedback else law.init_call(places, "&state", memory)
-    places |= {name: f"x[{i}]" for i, name in enumerate(("x1", "x2", "x3"))} | {"estimate": "x", "held": "held"}
-    step = law.step_call(places, "&state", memory, "u")
-    state, load, store = f"{law.name}_law_state state", "memcpy(&state, memory, sizeof state);", ""
-    if formulas.state:
-        store = "    memcpy(memory, &state, sizeof state);\n"
-        init, step = f"{state} = {{0}};\n    {init}", f"{state};\n    {load}\n    {step}"
-    return f"""static void law_init(double *memory, const double y[3])
-{{
-    (void)memory, (void)y;
-    {init}
-{store}}}
-
-static void law_step(double *memory, const double y[3], const double *x, double held, double *u)
-{{
-    (void)memory, (void)y, (void)x, (void)held;
-    {step}
-{store}}}
-"""
-
-
-def format_rig(rig: PluginRig, names: Sequence[str], build: str) -> str:
-    """Print rig.c.
+def format_rig(rig: PluginRig, recorded: RecordedRig) -> str:
+    """Print rig.c: the recorded functions, and the rig's tables.
 
     Args:
         rig: The rig.
-        names: Name of the export of each axis' controller.
-        build: Fingerprint of the code.
+        recorded: Its functions.
 
     Returns:
-        The text.
+        The text, with `BUILD` where the code's fingerprint belongs.
     """
-    clock, first = clock_of(rig), rig.axes[0].controller
-    declarations = "".join(f"extern const controller_type {name}_controller_type;\n" for name in names)
-    axes = "".join(
-        f"static const axis_type axis_{i} = {{\n{_fields(describe_axis(rig.axes[i], clock))}"
-        f"    .controller = &{name}_controller_type,\n}};\n\n"
-        for i, name in enumerate(names)
-    )
-    turning = ""
-    if rig.turning is not None:
-        coupling, gyro = rig.turning
-        matrices = coupling._asdict()
-        calibrated = replace(gyro, reading="calibrated")
-        described = {"gyro": describe_mems_gyro(calibrated, first.law.dt, NoiseStream.TURN_GYRO), **matrices}
-        turning = f"static const turning_type turning = {{\n{_fields(described)}}};\n\n"
-    fields = {
-        "plugin": rig.plugin,
-        "build": build,
-        "seed": float(rig.seed),
-        "world": float(rig.world),
-        "instant": clock.instant,
-        "period": clock.period // clock.steps,
-        "axes": len(rig.axes),
+    controls, sensors, recorder = rig.control.axes, recorded.sensors, recorded.recorder
+    steps = math.gcd(rig.control.period, *(one.sensor.steps_per_sample for one in sensors))
+
+    def locate(name: str, count: int) -> int:
+        return recorder.locate([f"{name} {i}" for i in range(count)])
+
+    inputs = locate("input", len(recorded.inputs))
+    rows, modules = [], []
+    for i, (axis, control) in enumerate(zip(rig.plant.axes, controls, strict=True)):
+        gimbals, settings = len(axis.modules), settings_of(control)
+        numbers = control.law.rate_limit, control.sensors.accelerometer.raw_rate_hz, _struct(settings)
+        counts = {"servo": gimbals, "motor": gimbals, "show": len(QUANTITIES), "setting": len(settings)}
+        places = [locate(f"{name} {i}", count) for name, count in counts.items()]
+        own = f"modules + {len(modules)}"
+        rows.append([c_text(axis.prefix), gimbals, _estimates(control), own, *numbers, *places])
+        modules += [_struct([c_text(one.name), one.direction, one.speed, one.gimbal_zero]) for one in axis.modules]
+    held, rate = locate("held", len(controls)), locate("rate", len(controls))
+    taken = recorder.locate(recorded.inputs)
+    rows_of_sensors = [_describe_sensor(one, steps, recorder) for one in sensors]
+    shown = [locate(f"shown {i}", SHOWN + _estimates(control)) for i, control in enumerate(controls)]
+    memory = recorder.locate(recorded.memory)
+    draws = all_draws([*(one.sensor for one in sensors), *rig.control.between])
+    noise = recorder.locate([])
+    generators = [f"{generator(stream)} = {locate(generator(stream), NOISE_WORDS)}" for stream in draws]
+    tables = {
+        "axis_type axes": [_struct([*row, place]) for row, place in zip(rows, shown, strict=True)],
+        "sensor_type sensors": rows_of_sensors,
+        "input_type inputs": recorded.inputs,
+        "int streams": list(draws),
     }
-    return f"""/* The rig's numbers. */
+    settled = -(-max(axis.settled for axis in controls) // steps)
+    trimmed = "rig_trimmed" if "rig_trimmed" in recorder.functions else "rig_later"
+    numbers = [
+        *(c_text(rig.plugin), c_text(BUILD), float(rig.seed), float(rig.world), steps * controls[0].timestep),
+        *(rig.control.period // steps, settled, *map(len, tables.values())),
+        *(inputs, held, rate, taken, shown[0], memory, noise, recorder.locate([])),
+        *("axes", "sensors", "inputs", "streams", "rig_first", trimmed, "rig_later"),
+    ]
+    printed = "".join(
+        f"static const {name}[] = {{\n    {f',{chr(10)}    '.join(map(str, values or [0]))},\n}};\n\n"
+        for name, values in {"module_type modules": modules, **tables}.items()
+    )
+    return f"""/* The rig: its sensors and decisions, recorded as functions of the state, and its numbers. */
 #include "rig.h"
 
-{declarations}
-{axes}{turning}static const axis_type *const axes[] = {{{", ".join(f"&axis_{i}" for i in range(len(names)))}}};
+#include "noise.h"
 
-const rig_type rig = {{
-{_fields(fields)}    .axis = axes,
-    .turning = {"&turning" if turning else "0"},
-}};
+#include <math.h>
+
+enum {{ {", ".join(["NONE", *generators])} }};
+
+{recorder.printed(recorded.parts)}{printed}const rig_type rig = {_struct(numbers)};
 """
 
 
-def _fields(struct: Mapping[str, Value], indent: str = "    ") -> str:
-    """Print the fields of a struct, a line each."""
-    return "".join(f"{indent}.{name} = {_value(value, indent)},\n" for name, value in struct.items())
+def _struct(values: Sequence[object]) -> str:
+    """Print a struct or a row, a float as C reads it exactly."""
+    return f"{{{', '.join(map(str, values))}}}"
 
 
-def _value(value: Value, indent: str = "") -> str:
-    """Print a number, a text, a struct, or a row of numbers; every number as C reads it exactly."""
-    if isinstance(value, str):
-        return c_text(value)
-    if isinstance(value, int):
-        return str(int(value))
-    if isinstance(value, float):
-        return repr(float(value))
-    if isinstance(value, Mapping):
-        return f"{{\n{_fields(value, indent + '    ')}{indent}}}"
-    return f"{{{', '.join(_value(part) for part in value)}}}"
+def _estimates(control: AxisControl) -> int:
+    """Count the parts of an estimate."""
+    return 3 + len(control.extra_signals[0])
+
+
+def _describe_sensor(one: RecordedSensor, steps: int, recorder: Recorder) -> str:
+    """Print a `sensor_type`, its times in instants of so many physics steps, and locate its numbers."""
+    sensor, width = one.sensor, len(one.delivered)
+    recorder.locate(one.memory)
+    delivered = recorder.locate(one.delivered)
+    on_the_way = [f"reading {one.name} {i}" for i in range(sensor.kept * width if sensor.latency else 0)]
+    older = [f"older {one.name} {i}" for i in range(sensor.older_kept * one.channels)]
+    numbers = [
+        *(one.channels, width, sensor.period // steps, sensor.raw // steps, sensor.skew // steps),
+        *(-(-sensor.latency // steps), sensor.settle, sensor.kept, sensor.older_kept),
+        *(recorder.locate(on_the_way) if on_the_way else delivered, recorder.locate(older), delivered),
+    ]
+    functions = [f"{one.name}_{part}" for part in ("ideal", "init", "take")]
+    return _struct([*numbers, *functions])

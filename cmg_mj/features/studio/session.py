@@ -16,7 +16,6 @@ from cmg_mj.core.controller import ControllerState
 from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.loop import acting, next_instant
 from cmg_mj.features.studio.settings import FieldValues, changed_fields
-from cmg_mj.inputs.features import entries
 from cmg_mj.inputs.messages import LARGEST
 from cmg_mj.inputs.types import MAX_TIME_S
 from cmg_mj.plant.mjcf import set_control_callback
@@ -127,13 +126,13 @@ class StudioSession:
     def __init__(self, experiment: Experiment) -> None:
         self.base = self.now = experiment
         self.plant, scenario = drawn_plant(experiment.plant), experiment.scenario
-        for name, make in entries("in_world").items():
-            self.plant = make(scenario.section(name), self.plant, scenario.seed, 0)
         self.timestep = self.plant.timestep
         self._lines = [axis.line for axis in self.plant.axes]
         self._users_pushes: list[Push] = []
-        others = {name: parts for name, parts in outsides(experiment.scenario).items() if name != "push"}
-        self._others = disturbances(others, [self.plant], experiment.scenario.seed, 0)
+        others = {name: parts for name, parts in outsides(scenario).items() if name != "push"}
+        self._others = disturbances(others, [self.plant], scenario.seed, 0)
+        for one in self._others:
+            (self.plant,) = one.placed([self.plant])
         self._gravity = self.model.opt.gravity.copy()
         self.ticks: deque[tuple[PlottedTick, ...]] = deque(maxlen=PLOTTED_TICKS)
         self._saved: dict[int, ControllerState] = {}
@@ -156,14 +155,18 @@ class StudioSession:
 
     def begin(self) -> None:
         """Begin a run at the present state, with a fresh controller."""
-        step = round(self.data.time / self.timestep)
-        self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
         self.ticks.clear()
-        self._saved.clear()
-        self.diverged = False
+        self._go_to(round(self.data.time / self.timestep))
+        self._start_controller()
+
+    def _go_to(self, step: int) -> None:
+        """Take a step for the present one; later pushes and ticks are forgotten."""
         self._next = step
         """The next step, unless someone moves the state in time."""
-        self._start_controller()
+        self.diverged = False
+        self._users_pushes = [push for push in self._users_pushes if push.start_s < (step - 0.5) * self.timestep]
+        while self.ticks and self.ticks[-1][0].time_s > self.data.time - 1e-9:
+            self.ticks.pop()
 
     def _start_controller(self) -> None:
         self.controller = self.now.controller()
@@ -205,12 +208,10 @@ class StudioSession:
             self.begin()
             self.note = f"the controller starts afresh at t = {self.data.time:g} s"
             return step
+        self._go_to(step)
+        self._set_pushes()
         self.controller.state = saved
         self.stopped = self.note = ""
-        self.diverged = False
-        self._next = self._acts_until = step
-        while self.ticks and self.ticks[-1][0].time_s > self.data.time - 1e-9:
-            self.ticks.pop()
         return step
 
     def step(self) -> bool:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from cmg_mj.core.errors import InputError, nearest, shown
-from cmg_mj.core.loop import Outside
+from cmg_mj.core.loop import Disturbance, Outside
 from cmg_mj.features.track import Track
 from cmg_mj.inputs.files import require_file
 from cmg_mj.plant.elements import element_id
@@ -135,14 +135,11 @@ def track_motion(
     return TrackMotion(tracks, plants[0].model)
 
 
-class TrackMotion:
+class TrackMotion(Disturbance):
     """Sets actuators at every instant: to the setpoint in the middle of what follows.
 
     One that integrates its control (`<intvelocity>`) is given the rate, so that its setpoint runs straight.
     """
-
-    accelerates = False
-    edges: Sequence[int] = ()
 
     def __init__(self, tracks: Sequence[Track], model: mujoco.MjModel) -> None:
         self._timestep = float(model.opt.timestep)

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.features.bend import Bend, BendBeyond
-from cmg_mj.features.bend.edit import STEP_SHARE
+from cmg_mj.features.bend import STEP_SHARE, Bend, BendBeyond
 from cmg_mj.features.bend.verdict import rk4_energy_loss
 from cmg_mj.plant.elements import BEND_JOINT
 from cmg_mj.plant.plant import Plant, load_plant
@@ -21,6 +20,7 @@ from cmg_mj.results.trajectory import Trajectory
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario, parse_scenario
 from tests.features.plugin.made import assert_same_run, needs_compiler
+from tests.recorded import recorded
 
 SENSORS = ("accelerometer_inner", "accelerometer_outer", "fog")
 
@@ -142,9 +142,7 @@ def short(*settings: str) -> Experiment:
 
 
 def trajectory(experiment: Experiment) -> Trajectory:
-    result = experiment.run()
-    assert result.trajectory is not None
-    return result.trajectory
+    return recorded(experiment.run())
 
 
 def test_a_stiff_frame_moves_as_a_rigid_one() -> None:

@@ -24,6 +24,7 @@ from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
 from tests.features.board.toy import SHORT, needs_board, short
+from tests.recorded import assert_same_bits, recorded
 from tests.tiers import slow_but
 
 pytestmark = needs_board
@@ -84,10 +85,7 @@ def test_a_processor_that_is_the_controller_changes_nothing() -> None:
     experiment = short("adaptive")
     ours, on_processor = experiment.run(), run_on(experiment, Recorder(experiment))
     assert ours.summaries == on_processor.summaries
-    assert ours.trajectory is not None
-    assert on_processor.trajectory is not None
-    for name in ours.trajectory.columns:
-        np.testing.assert_array_equal(ours.trajectory[name], on_processor.trajectory[name], err_msg=name)
+    assert_same_bits(recorded(ours), recorded(on_processor))
 
 
 @pytest.mark.parametrize("observer", slow_but([name for name in OBSERVERS if name != "mems_fused"], "linear"))
@@ -136,15 +134,14 @@ def test_it_closes_the_loop(observer: str, settings: tuple[str, ...]) -> None:
     experiment = short(observer, *NO_COUNTS, *settings)
     with temporary_export(experiment.axis_controller()) as (name, folder):
         assert double_precision_names(build(name, folder).path) == []
-    host, board = experiment.run(), experiment.run(driver="board")
-    assert board.outcomes == host.outcomes
-    assert host.trajectory is not None
-    assert board.trajectory is not None
-    assert board.trajectory.columns.keys() == host.trajectory.columns.keys()
+    results = [experiment.run(driver) for driver in ("native", "board")]
+    assert results[0].outcomes == results[1].outcomes
+    host, board = map(recorded, results)
+    assert board.columns.keys() == host.columns.keys()
     for name in ("x1_rad", "x2_rad_s", "u_rad_s", "x_e_rad_times_s", f"estimate/{observer}/x2_rad_s"):
-        np.testing.assert_allclose(board.trajectory[name], host.trajectory[name], atol=1e-4, err_msg=name)
-    assert not np.array_equal(board.trajectory["u_rad_s"], host.trajectory["u_rad_s"])
-    assert np.isnan(board.trajectory["x_e_rad_times_s"]).all() == (settings == (f"{OWN_LAW}Memoryless",))
+        np.testing.assert_allclose(board[name], host[name], atol=1e-4, err_msg=name)
+    assert not np.array_equal(board["u_rad_s"], host["u_rad_s"])
+    assert np.isnan(board["x_e_rad_times_s"]).all() == (settings == (f"{OWN_LAW}Memoryless",))
 
 
 @pytest.mark.slow

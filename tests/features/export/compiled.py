@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from cmg_mj import load_scenario, prepare
+from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.controller import Controller
-from cmg_mj.core.types import reads_gyro
 from cmg_mj.features.export import export
 
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
@@ -40,16 +40,21 @@ def controller(kind: str, *settings: str) -> Controller:
     return prepare(load_scenario("push_recovery", settings, kind)).axis_controller()
 
 
+def control(kind: str, *settings: str) -> AxisControl:
+    return controller(kind, *settings).axes[0]
+
+
 class Compiled:
     """An export as a shared library, compiled without a warning, and what its example says."""
 
     def __init__(self, kind: str, precision: Any, folder: Path, *settings: str) -> None:
         self.type = TYPES[precision]
         loop = controller(kind, *settings)
+        (axis,) = loop.axes
         files = export(loop, folder, precision=precision)
         self.name = files[0].stem
-        self.width = 3 + len(loop.extra_signals[0])
-        self.gyro_at = 4 + len(loop.gimbal_angle.zeros) if reads_gyro(loop.observer) else None
+        self.width = 3 + len(axis.extra_signals[0])
+        self.gyro_at = 4 + len(axis.plant.gimbal_angle.zeros) if axis.reads_gyro else None
         self.header, self.source, self.example, _ = files
         read_by_every_compiler(self.source, self.example)
         self.library = folder / "export.so"
@@ -105,18 +110,17 @@ class Recording:
     def __init__(self, kind: str, *settings: str) -> None:
         experiment = prepare(load_scenario("push_recovery", settings, kind))
         controller = experiment.axis_controller()
+        (axis,) = controller.axes
         samples, results, rates = [], [], []
-        decide = controller.decide
 
-        def decide_and_record(step: int, forces: Any, encoders: Any, fog: float, rate: float, gyro: float) -> Any:
-            tick = decide(step, forces, encoders, fog, rate, gyro)
-            samples.append([*forces, *encoders, *([gyro] if reads_gyro(controller.observer) else [])])
+        def record_tick(_: float) -> None:
+            state, tick = controller.state, controller.ticks[0]
+            forces, encoders, _, gyro = axis.delivered(state.sampled[0], state.step or 0)
+            samples.append([*forces, *encoders, *([gyro] if axis.reads_gyro else [])])
             results.append([*tick.estimates[0], tick.u])
-            rates.append(rate)
-            return tick
+            rates.append(state.readings.rate)
 
-        controller.decide = decide_and_record  # type: ignore[method-assign]
-        experiment.simulate(experiment.plant, controller)
+        experiment.simulate(experiment.plant, controller, on_progress=record_tick)
         self.samples, self.results, self.rate = np.array(samples), np.array(results), np.array(rates)
 
 

@@ -13,7 +13,7 @@ from cmg_mj.core.errors import InputError
 from cmg_mj.features.export import export, generate_code, write_code
 from cmg_mj.results import folder
 from tests.command import cmg_mj
-from tests.features.export.compiled import compile_c, controller, needs_compiler
+from tests.features.export.compiled import compile_c, control, controller, needs_compiler
 
 FILES = ["linear.c", "linear.h", "linear_example.c", "linear_test_vector.h"]
 
@@ -148,8 +148,8 @@ def test_large_gains_amplify_rounding_and_are_still_looked_at(monkeypatch: pytes
     """u is off by k2 times what the rate is off by; k2 itself may not be off by half a percent."""
     k2 = 300.0
     monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 400)
-    loop = controller("gyro_free", f"controller.gains=[{8.0 * k2}, {k2}, -1.1, 0.35]")
-    code = generate_code(loop, "single")
+    axis = control("gyro_free", f"controller.gains=[{8.0 * k2}, {k2}, -1.1, 0.35]")
+    code = generate_code(axis, "single")
     off = code.figures["c_off_by"]
     assert off["u_rad_s"] < 1.1 * k2 * off["x2_rad_s"] + 1e-4
     assert code.figures["beyond_rounding"] == []

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cmg_mj.core.axis import AxisControl, Delivered, Known
 from cmg_mj.core.controller import Controller
 from cmg_mj.core.errors import InputError
+from cmg_mj.core.types import Measurement
 from cmg_mj.features.export import export, generate_code
 from tests.command import cmg_mj
 from tests.features.export import own, own_laws
-from tests.features.export.compiled import controller
+from tests.features.export.compiled import control, controller
 
 NUMBER = "a plain number is asked for"
 CURE = "compiled routines of numpy and scipy take no symbols; write it out in + - * /"
@@ -80,34 +83,39 @@ def refusal(subject: Controller, module: Any, name: str, folder: Path) -> str:
     return complaint
 
 
-class Derived(Controller):
+class Derived(AxisControl):
     """What it does otherwise, C would not have."""
 
+    def measure(self, delivered: Delivered, known: Known | None = None) -> Measurement:
+        y = super().measure(delivered, known)
+        return Measurement(2.0 * y.y1, y.y2, y.acceleration)
 
-def test_a_controller_of_another_class_is_refused() -> None:
-    plain = controller("linear")
-    with pytest.raises(InputError, match=r"^Derived: "):
-        generate_code(Derived(plain.observer, plain.law, plain.sensors, plain.plant), "double")
+
+def test_a_control_of_another_class_is_refused() -> None:
+    plain = control("linear")
+    with pytest.raises(InputError, match=DIFFERENCE):
+        generate_code(Derived(**vars(replace(plain))), "double")
 
 
 @pytest.mark.parametrize(("field", "value"), [("feedback", "fog"), ("feedback", "truth"), ("notch_hz", "20.0")])
 def test_a_setting_that_c_does_not_have_is_refused_by_name(field: str, value: str) -> None:
     with pytest.raises(InputError, match=rf"^controller\.{field}\b.* set controller\.{field}="):
-        generate_code(controller("linear", f"controller.{field}={value}"), "double")
+        generate_code(control("linear", f"controller.{field}={value}"), "double")
 
 
 class Hum:
     """A stage without C."""
 
-    def __call__(self, u: Any) -> Any:
-        return u
+    def init(self, u: Any) -> Any:
+        return ()
+
+    def step(self, memory: Any, u: Any) -> Any:
+        return memory, u
 
 
 def test_a_stage_that_c_does_not_have_is_refused_by_name() -> None:
-    plain = controller("linear")
-    humming = Controller(plain.observer, plain.law, plain.sensors, plain.plant, commands=[Hum])
     with pytest.raises(InputError, match=r"^Hum: "):
-        generate_code(humming, "double")
+        generate_code(replace(control("linear"), commands=(Hum(),)), "double")
 
 
 @pytest.mark.usefixtures("elsewhere")

@@ -14,7 +14,16 @@ from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.features.export import c_files, check, export, pipeline
 from cmg_mj.features.export.names import estimate_places
 from cmg_mj.observers import OBSERVERS
-from tests.features.export.compiled import COMPILER, STRICT, TYPES, Compiled, compile_c, controller, needs_compiler
+from tests.features.export.compiled import (
+    COMPILER,
+    STRICT,
+    TYPES,
+    Compiled,
+    compile_c,
+    control,
+    controller,
+    needs_compiler,
+)
 
 OK, INPUT, RESULT = range(3)
 NOT_FINITE = (math.nan, math.inf, -math.inf)
@@ -30,7 +39,7 @@ def few_signals(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def samples(kind: str, precision: Any) -> np.ndarray:
-    return check.signals(controller(kind), 0, precision)
+    return check.signals(control(kind), 0, precision)
 
 
 def broken(readings: np.ndarray, tick: int, place: int, value: float) -> np.ndarray:
@@ -100,9 +109,9 @@ def test_a_number_of_the_controller_that_is_not_finite_stops_it(
 ) -> None:
     """As a cosmic ray, or an observer that diverges: whatever member it is, unless it is not read again."""
     compiled, readings = Compiled(kind, "double", tmp_path, *law), samples(kind, "double")
-    code = pipeline.generate_code(controller(kind, *law), "double")
-    stateless = code.figures["numbers_in_state"] == 0  # then the first number is a place that nothing uses
-    members = stateless + code.figures["numbers_in_state"] + len(code.law.law.state) + 2
+    traced, _, _ = pipeline._traced(control(kind, *law))
+    stateless = not traced.state  # then the first number is a place that nothing uses
+    members = stateless + len(traced.state) + len(traced.law.state) + 2
     seen = 0
     for member in range(stateless, members):
         compiled.statuses(readings[:30])

@@ -18,7 +18,7 @@ from cmg_mj.features.export.names import identifiers, name_of
 from cmg_mj.features.export.pipeline import generate_code
 from cmg_mj.observers import Measurement
 from tests.features.export import own
-from tests.features.export.compiled import controller
+from tests.features.export.compiled import control
 from tests.test_elementwise import FUNCTIONS, SPECIAL
 
 
@@ -85,14 +85,14 @@ def test_what_is_remembered_in_a_global_is_refused(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
     observer = "tests.features.export.own:RemembersInAGlobal"
     with pytest.raises(InputError, match="remembers something outside of its state"):
-        generate_code(controller(observer), "double")
+        generate_code(control(observer), "double")
     with pytest.raises(InputError, match=r"remembered from an earlier recording \(.*own.py, line \d+: rate = "):
-        generate_code(controller(observer), "double")
+        generate_code(control(observer), "double")
 
 
 def test_what_is_remembered_and_not_used_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmg_mj.features.export.check.TICKS", 40)
-    code = generate_code(controller("tests.features.export.own:RemembersForNothing"), "double")
+    code = generate_code(control("tests.features.export.own:RemembersForNothing"), "double")
     assert code.figures["trace_off_by"] == 0.0
 
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from cmg_mj.core.noise import Normals
 from cmg_mj.features.gait import Gait
-from cmg_mj.features.gait.switches import FootSwitches
+from cmg_mj.features.gait.switches import foot_switches
 
 DT = 0.005
 
 
 def said(force: np.ndarray, **settings: Any) -> np.ndarray:
     """Return what the switch of the left foot says of forces, tick by tick; the right one stands."""
-    first: Any = SimpleNamespace(law=SimpleNamespace(dt=DT), seed=3, world_ids=0)
-    switches = FootSwitches(Gait(**settings), first)
-    return np.array([switches([f, 50.0])[0] for f in force])
+    switches = foot_switches(Gait(**settings), DT)
+    noise = {stream: Normals(3, 0, stream, width) for stream, width in switches.draws.items()}
+    feet, shown = switches.init([force[0], 50.0]), []
+    for tick, f in enumerate(force.tolist()):
+        feet, (left, _) = switches.step(feet, [f, 50.0], tick, noise)
+        shown.append(left)
+    return np.array(shown)
 
 
 LANDS = np.where(np.arange(80) < 30, 0.0, 40.0)

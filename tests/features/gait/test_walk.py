@@ -14,6 +14,7 @@ from cmg_mj.results.result import Result
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
+from tests.recorded import assert_same_bits, recorded
 
 QUIET = "sensors.accelerometer.noise_density_ug_rthz=100"
 HELD = "controller.rate_limit_rad_s=1e-6"
@@ -95,25 +96,21 @@ def test_figures_do_not_depend_on_the_step() -> None:
 
 @LONG
 @pytest.mark.parametrize(("roll", "pitch"), [(0.4, -0.4), (-0.4, 0.4)])
-def test_the_equilibrium_bias_is_found(monkeypatch: pytest.MonkeyPatch, roll: float, pitch: float) -> None:
+def test_the_equilibrium_bias_is_found(roll: float, pitch: float) -> None:
     """Within 0.1 deg, and the torso is moved by all of it."""
-    made: list[stage.Walking] = []
-    start = stage.Walking.__init__
-
-    def remembered(self: stage.Walking, *arguments: object) -> None:
-        start(self, *arguments)  # type: ignore[arg-type]
-        made.append(self)
-
-    monkeypatch.setattr(stage.Walking, "__init__", remembered)
-    walked(4, QUIET, *(f"{field}={e}" for field, e in zip(E_DEG, (roll, pitch), strict=True)))
-    lean = made[-1]._lean
-    np.testing.assert_allclose(np.degrees(np.mean(lean.bias, axis=1)), [roll, pitch], atol=0.1)
-    np.testing.assert_allclose(np.degrees(np.mean(lean.lean, axis=1)), [roll, pitch], atol=0.1)
+    own = [f"{field}={e}" for field, e in zip(E_DEG, (roll, pitch), strict=True)]
+    experiment = prepare(load_scenario("walk", [*own, QUIET]))
+    controller = experiment.controller(range(4))
+    experiment.simulate([experiment.plant] * 4, controller, keep_trajectory=False)
+    assert controller.state.deciding is not None
+    leaning = controller.state.deciding.between[0].leaning
+    np.testing.assert_allclose(np.degrees(np.mean(leaning.bias, axis=1)), [roll, pitch], atol=0.1)
+    np.testing.assert_allclose(np.degrees(np.mean(leaning.lean, axis=1)), [roll, pitch], atol=0.1)
 
 
 def test_tiles_differ_from_world_to_world_and_not_from_run_to_run() -> None:
     height = [
-        walked(2, QUIET, *SHORT, "gait.tiles_m=0.004", keep_trajectory=True).trajectory["position/torso/z_m"][-1]  # type: ignore[index]
+        recorded(walked(2, QUIET, *SHORT, "gait.tiles_m=0.004", keep_trajectory=True))["position/torso/z_m"][-1]
         for _ in range(2)
     ]
     np.testing.assert_array_equal(*height)
@@ -123,14 +120,9 @@ def test_tiles_differ_from_world_to_world_and_not_from_run_to_run() -> None:
 def test_a_world_is_the_same_alone_by_callback_and_among_others() -> None:
     settings = [QUIET, *SHORT, "gait.tiles_m=0.001", "plant.equilibrium_bias_deg=0.2"]
     experiment = prepare(load_scenario("walk", settings))
-    alone, called = experiment.run(world=1).trajectory, experiment.run(world=1, driver="callback").trajectory
-    many = experiment.run_many([0, 1]).trajectory
-    assert alone is not None
-    assert called is not None
-    assert many is not None
-    for name in ("roll/x1_rad", "pitch/u_rad_s", "position/torso/x_m"):
-        np.testing.assert_array_equal(alone[name], many[name][:, 1])
-        np.testing.assert_array_equal(alone[name], called[name])
+    alone = recorded(experiment.run(world=1))
+    assert_same_bits(recorded(experiment.run(world=1, driver="callback")), alone)
+    assert_same_bits(recorded(experiment.run_many([0, 1])).world(1), alone)
 
 
 def test_what_the_legs_do_not_reach_is_refused() -> None:

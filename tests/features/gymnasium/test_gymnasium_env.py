@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import os
+import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -13,12 +16,13 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from cmg_mj.core.controller import Tick
+from cmg_mj.core.axis import Tick
 from cmg_mj.core.errors import InputError
 from cmg_mj.features.gymnasium import ID, READINGS, STATE_COST, ScissoredPairEnv
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import ROOT, environment
+from tests.recorded import recorded
 
 SHORT = ["duration_s=3.0", "push.0.start_s=0.5"]
 REAL = [
@@ -70,8 +74,7 @@ def test_our_controller_gives_the_runners_trajectory(scenario: str, settings: li
     env = ScissoredPairEnv(scenario, settings, in_rad_s=True)
     ticks, infos, _ = act(env, seed, world=world)
     result = prepare(load_scenario(scenario, [*settings, f"seed={seed}"])).run(world=world)
-    trajectory = result.trajectory
-    assert trajectory is not None
+    trajectory = recorded(result)
     assert len(ticks) == len(trajectory)
     for name, field in (("y1_rad", "y1"), ("y2_rad", "y2"), ("u_rad_s", "u"), ("fog_rad_s", "fog")):
         assert [getattr(tick, field) for tick in ticks] == trajectory[name].tolist(), name
@@ -96,6 +99,23 @@ def test_a_fall_ends_it_and_never_pays() -> None:
     assert total < 2.0 * standing < 0.0
     with pytest.raises(InputError, match="call reset"):
         env.step(np.zeros(1))
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+def test_a_copy_goes_on_as_the_original(copied: Callable[[ScissoredPairEnv], ScissoredPairEnv]) -> None:
+    """Bit for bit, from the middle of an episode to its end, and over when it is over."""
+    env = ScissoredPairEnv("push_recovery", [*UNEVEN, *REAL, "swing=[{frequency_hz=2.0}]"], in_rad_s=True)
+    env.reset(seed=3)
+    for _ in range(30):
+        env.step(np.array([0.3]))
+    other, is_over = copied(env), False
+    while not is_over:
+        results = [each.step(np.array([0.2])) for each in (env, other)]
+        assert repr(results[0]) == repr(results[1])
+        is_over = results[0][2]
+    assert not copied(env)._physics.any_running
+    with pytest.raises(InputError, match="call reset"):
+        copied(env).step(np.zeros(1))
 
 
 def test_the_reward_is_the_cost_of_the_state_and_the_action() -> None:

@@ -15,6 +15,7 @@ from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.features.gymnasium.test_gymnasium_env import act
 from tests.features.mounting.robots import ROBOTS
+from tests.recorded import assert_same_bits, recorded
 
 PUSH_SETTINGS = ["duration_s=1.0", "plant.initial_tilt_deg=0.2", "push=[{start_s=0.25,torque_n_m=1.0}]"]
 
@@ -37,23 +38,17 @@ def open_experiment(scenario: str) -> Experiment:
 @pytest.mark.daily_cases("bicycle")
 def test_the_callback_and_a_batch_give_the_runners_trajectory(scenario: str) -> None:
     experiment = open_experiment(scenario)
-    native, callback = (experiment.run(driver) for driver in ("native", "callback"))
-    many = experiment.run_many(2)
-    assert native.trajectory is not None
-    assert callback.trajectory is not None
-    assert many.trajectory is not None
+    native = experiment.run()
     assert native.stood.all()
-    for name, values in native.trajectory.columns.items():
-        np.testing.assert_array_equal(callback.trajectory[name], values, err_msg=name)
-        np.testing.assert_array_equal(many.trajectory.world(0)[name], values, err_msg=name)
+    assert_same_bits(recorded(experiment.run("callback")), recorded(native))
+    assert_same_bits(recorded(experiment.run_many(2)).world(0), recorded(native))
 
 
 @pytest.mark.daily_cases("bicycle")
 def test_the_environment_gives_it_too(scenario: str) -> None:
     env = ScissoredPairEnv(scenario, PUSH_SETTINGS, in_rad_s=True)
     ticks, infos, _ = act(env, 0)
-    trajectory = open_experiment(scenario).run().trajectory
-    assert trajectory is not None
+    trajectory = recorded(open_experiment(scenario).run())
     assert len(ticks) == 200
     for name in ("x1_rad", "x2_rad_s", "x3_rad"):
         np.testing.assert_array_equal([info[name] for info in infos[:-1]], trajectory[name])

@@ -20,6 +20,7 @@ from cmg_mj.runs.experiment import Experiment
 from tests.command import cmg_mj
 from tests.features.mounting.push_robots import cart_pole
 from tests.features.mounting.test_simulated_push import pushed
+from tests.recorded import recorded
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("elsewhere")]
 
@@ -90,9 +91,7 @@ def test_a_motion_across_moves_what_the_cart_slides_on_alone(light_cart: Experim
     motion = {"kind": "sine", "acceleration_m_s2": 1.0, "frequency_hz": 2.0}
 
     def tilts(*pivots: dict[str, Any]) -> np.ndarray:
-        trajectory = light_cart.with_settings({**settings, "pivot": list(pivots)}).run().trajectory
-        assert trajectory is not None
-        return np.asarray(trajectory["x1_rad"])
+        return recorded(light_cart.with_settings({**settings, "pivot": list(pivots)}).run())["x1_rad"]
 
     across, vertical = ({**motion, "direction": direction} for direction in ("across", "vertical"))
     still = tilts()

@@ -21,6 +21,7 @@ from cmg_mj.runs.experiment import prepare
 from tests.command import cmg_mj
 from tests.features.mounting.push_robots import without_time_limit
 from tests.features.mounting.robots import EXAMPLES, ROBOTS
+from tests.recorded import recorded
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -93,8 +94,7 @@ def test_every_joint_is_held_where_it_stands() -> None:
     assert not outlook.hints
     result = write_scenario(model, model, "homogeneous", outlook).run()
     assert result.stood.all()
-    trajectory = result.trajectory
-    assert trajectory is not None
+    trajectory = recorded(result)
     quaternions = np.stack([trajectory[f"orientation/shoulder/{part}"] for part in "xyz"])
     assert np.degrees(2.0 * np.abs(quaternions)).max() < 0.1
     assert np.abs(trajectory["position/gripper_m"]).max() < 1e-3

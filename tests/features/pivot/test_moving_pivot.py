@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from cmg_mj.core.errors import InputError
-from cmg_mj.core.loop import Outside, instants
 from cmg_mj.core.types import IdealReading
 from cmg_mj.features.pivot import Pivot
 from cmg_mj.features.pivot.moving_pivot import pivot_directions
@@ -22,6 +21,7 @@ from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
 from tests.command import cmg_mj
 from tests.features.pivot.driven_base import DrivenBase
+from tests.recorded import assert_same_bits, recorded
 
 NOISE = 'pivot=[{kind="noise", acceleration_m_s2=0.3, corner_hz=5.0}]'
 STEP_OF_NONE = '{kind="step", acceleration_m_s2=0.0}'
@@ -60,13 +60,13 @@ def test_equals_a_base_that_slide_joints_drive(scenario: str, settings: list[str
     axis = plant.axis_names[0] or None
     pivots = [Pivot(**{**vars_of(pivot), "axis": axis}) for pivot in ALL_WAYS]
     shifted, driven = OneWorld(plant), DrivenBase(plant)
-    steps, per_sample, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
+    steps, held, h = round(0.5 / plant.timestep), round(0.005 / plant.timestep), plant.timestep
 
     move = PivotSignals(pivots, pivot_directions(plant, pivots), 0, 0, h)
 
     joints, readings = [], []
-    for step, held in instants(steps, per_sample):
-        acceleration = move(step, held, Outside([0.0])).acceleration
+    for step in range(0, steps, held):
+        acceleration = move.at(step, held).acceleration
         assert acceleration is not None
         shifted.accelerate(acceleration)
         driven.accelerate(acceleration)
@@ -130,17 +130,12 @@ def test_directions_of_several_axes_are_those_of_their_lines() -> None:
 def test_one_world_of_many_is_the_world_alone() -> None:
     """Bit for bit, whatever the number and the order of the worlds, and where their plants and sizes differ."""
     rig = experiment(NOISE, observer="gyro_free")
-    alone = rig.run(world=3).trajectory
-    many = rig.run_many([5, 3, 0]).trajectory
+    alone = recorded(rig.run(world=3))
+    many = recorded(rig.run_many([5, 3, 0]))
     vary = {"pivot.0.acceleration_m_s2": [0.1, 0.3], "equilibrium_bias_deg": [0.0, 0.5]}
-    varied = rig.run_many([3, 3], settings=vary).trajectory
-    assert alone is not None
-    assert many is not None
-    assert varied is not None
-    for name, column in alone.columns.items():
-        if many[name].ndim > 1:
-            np.testing.assert_array_equal(many[name][:, 1], column, name)
-            np.testing.assert_array_equal(varied[name][:, 1], column, name)
+    varied = recorded(rig.run_many([3, 3], settings=vary))
+    assert_same_bits(many.world(1), alone)
+    assert_same_bits(varied.world(1), alone)
     assert np.abs(varied["x1_rad"][:, 0] - alone["x1_rad"]).max() > 1e-3
 
 
@@ -158,16 +153,12 @@ def test_every_plant_of_a_batch_is_looked_at() -> None:
 
 def test_the_callback_sees_the_same() -> None:
     rig = experiment(NOISE, "duration_s=0.3")
-    native, called = rig.run().trajectory, rig.run(driver="callback").trajectory
-    assert native is not None
-    assert called is not None
-    for name, column in native.columns.items():
-        np.testing.assert_array_equal(called[name], column, name)
+    assert_same_bits(recorded(rig.run(driver="callback")), recorded(rig.run()))
 
 
 def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
     rig = experiment(NOISE, "duration_s=0.3")
-    expected = rig.run().trajectory
+    expected = recorded(rig.run())
     plant, pivots = rig.plant.with_own_model(), rig.scenario.section("pivot")
     pivot = PivotSignals(pivots, pivot_directions(plant, pivots), seed=0, world_ids=0)
     still = plant.model.opt.gravity.copy()
@@ -178,7 +169,6 @@ def test_a_users_own_loop_moves_it_as_the_docs_say() -> None:
         plant.model.opt.gravity[:] = still - pivot.mean(k * 0.005, (k + 1) * 0.005)
         control(plant, controller, data)
         mujoco.mj_step(plant.model, data)
-    assert expected is not None
     np.testing.assert_array_equal(tilts, expected["x1_rad"])
 
 

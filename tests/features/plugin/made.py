@@ -42,6 +42,11 @@ ALL_IMPERFECTIONS = (
     "sensors.encoder.latency_s=0.004",
     "plant.gimbal_backlash_arcmin=10",
 )
+EFFECTS = (
+    "sensors.accelerometer.vibration_mg=4.0",
+    "sensors.accelerometer.wheel_harmonics_mg=[2.0, 1.0]",
+    "controller.notch_hz=20",
+)
 EXACT = (
     "sensors.accelerometer.noise_density_ug_rthz=0",
     "sensors.accelerometer.counts_per_g=0",

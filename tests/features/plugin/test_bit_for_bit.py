@@ -7,6 +7,8 @@ import pytest
 from cmg_mj.observers import OBSERVERS
 from tests.features.plugin.made import (
     ALL_IMPERFECTIONS,
+    EFFECTS,
+    EXACT,
     SENSORS,
     check_against_runner,
     make,
@@ -59,10 +61,18 @@ def test_every_integrator(kind: str, sensors: str) -> None:
             ("plant.accelerometer_inner_misplaced_mm=-3", "plant.accelerometer_outer_misplaced_mm=5"), id="misplaced"
         ),
         pytest.param(("sensors.accelerometer.noise_density_ug_rthz=800",), id="noise"),
+        *(pytest.param((effect,), id=effect) for effect in EFFECTS),
+        pytest.param((*ALL_IMPERFECTIONS, *EFFECTS, *EXACT), id="all effects, unrounded"),
     ],
 )
 def test_settings(settings: tuple[str, ...]) -> None:
     check("gyro_free", *settings)
+
+
+def test_means_over_a_sample() -> None:
+    biped = ("model=biped", "equilibrium_bias_deg=0.0", "initial_tilt_deg=0.0", "turn_rate_rad_s=0.0")
+    settings = ("sensors.accelerometer.averaged=true", "controller.gains=scaled", "duration_s=3.0", "push=[]")
+    check("gyro_free", *(f"plant.{setting}" for setting in biped), *settings, scenario="two_axes")
 
 
 def test_trimmed_integrator() -> None:

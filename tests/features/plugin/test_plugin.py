@@ -13,8 +13,6 @@ import pytest
 
 from cmg_mj import InputError
 from cmg_mj.features.plugin.driver import FAILED, STATUS, instance_states, set_world
-from cmg_mj.features.plugin.make import describe_rig
-from cmg_mj.features.plugin.tables import NAMES_IN_USE, common_files, generate_plugin
 from cmg_mj.plant.mjcf import quiet
 from tests.features.plugin.made import check_against_runner, needs_compiler, quick, run
 
@@ -323,9 +321,3 @@ def test_drives_that_are_switched_off(option: str, value: int, messages: list[st
     assert data.sensor("balance/command").data == 0.0
     assert instance_states(model, data)[0][STATUS] == FAILED
     np.testing.assert_array_equal(data.act_dot, 0.0)
-
-
-def test_every_name_that_the_c_has_is_refused() -> None:
-    assert {name.partition(".")[0] for name in common_files()} | {"rig"} <= NAMES_IN_USE
-    with pytest.raises(InputError, match=r"^--name rig: "):
-        generate_plugin(describe_rig(quick().experiment, "rig"), "rig")

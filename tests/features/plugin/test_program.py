@@ -46,9 +46,7 @@ def compile_strictly(made: Made, folder: Path, *flags: str) -> tuple[Path, Path]
     common = [str(COMPILER), *STRICT, *flags, "-isystem", str(place / "include")]
     link = [f"-L{place}", f"-l:{mujoco_library.name}", f"-Wl,-rpath,{place}", "-lm"]
     source = made.plugin.library.parent
-    all_files = {path.name: path for path in source.glob("*.c") if not path.name.endswith("_example.c")}
-    included = {name.replace("_controller.c", ".c") for name in all_files if name.endswith("_controller.c")}
-    sources = [str(path) for name, path in all_files.items() if name not in included]
+    sources = [str(path) for path in source.glob("*.c") if not path.name.endswith("_example.c")]
     if flags == SANITIZERS:
         shim = folder / "stack.c"
         shim.write_text(STACK_SHIM, encoding="utf-8")
@@ -129,7 +127,7 @@ def test_the_readmes_observer_without_python(readmes_observer: str, tmp_path: Pa
     ],
 )
 def test_sanitizers(scenario: str, settings: tuple[str, ...], tmp_path: Path) -> None:
-    made = make("gyro_free", *settings, "push=[]", scenario=scenario)
+    made = make("mems_fused", *settings, "push=[]", scenario=scenario)
     rows, _ = run_program(made.plugin.model, *compile_strictly(made, tmp_path, *SANITIZERS), 2000, 20)
     np.testing.assert_array_equal(rows, expected(made, 2000))
 

@@ -17,6 +17,7 @@ from cmg_mj.features.replay.log_replay import replay_log, replay_prepared
 from cmg_mj.features.replay.noise import noise_figures, noise_of, noise_remarks
 from cmg_mj.features.replay.reading import read_log
 from tests.features.replay.motion import DT, N, read, sine, two_accelerometers
+from tests.recorded import recorded
 
 RUN_COLUMNS = {
     "time": "time_s",
@@ -45,9 +46,7 @@ def test_a_run_replayed_without_being_told_its_noise(density: float, tmp_path: P
     for seed in range(2):
         settings = ["observer.kind=gyro_free", sensor, f"seed={seed}", "duration_s=15.0"]
         experiment = prepare(load_scenario("push_recovery", settings))
-        trajectory = experiment.run().trajectory
-        assert trajectory is not None
-        trajectory.save(tmp_path / "run.parquet")
+        recorded(experiment.run()).save(tmp_path / "run.parquet")
         log = read_log(tmp_path / "run.parquet", ReadOptions(RUN_COLUMNS))
         _, model, truth = experiment.design.constructor_arguments
         errors = []

@@ -40,7 +40,7 @@ class RecordingStepping(Stepping):
     def on_load_model(self, event: messages.LoadModelEvent) -> bool:
         before = self.live
         is_done = super().on_load_model(event)
-        if self.live is not None and self.live is not before:
+        if self.live is not before:
             vars(self.live)["step"] = recording(self.live, self.rows)
         return is_done
 
@@ -53,9 +53,7 @@ def recording(live: StudioSession, rows: list[tuple[float, ...]]) -> Callable[[]
         has_ticked = step()
         if has_ticked:
             row = [time]
-            for line, part in zip(lines, live.controller.axes, strict=True):
-                tick = part.tick
-                assert tick is not None
+            for line, tick in zip(lines, live.controller.ticks, strict=True):
                 push = sum(float(data.qfrc_applied[dof]) * share for dof, share in zip(*line.push, strict=True))
                 row += [float(line.rate(v)), tick.y1, tick.y2, tick.fog, tick.u, tick.x_e, push]
             rows.append((*row, *q, *v))
@@ -78,7 +76,6 @@ class Session:
 
     @property
     def live(self) -> StudioSession:
-        assert self.stepping.live is not None
         return self.stepping.live
 
     @property

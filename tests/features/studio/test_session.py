@@ -12,6 +12,7 @@ from cmg_mj import load_scenario, prepare
 from cmg_mj.features.studio.panel import ChangeSettings, PushRequest
 from cmg_mj.features.studio.settings import NOISE
 from tests.features.studio.session import as_rows, session
+from tests.recorded import recorded
 
 RATE, PUSH = 1, 7
 """Columns of a row."""
@@ -19,9 +20,7 @@ RATE, PUSH = 1, 7
 
 @cache
 def runner_rows(*settings: str, scenario: str = "push_recovery") -> np.ndarray:
-    trajectory = prepare(load_scenario(scenario, list(settings))).run().trajectory
-    assert trajectory is not None
-    return as_rows(trajectory)
+    return as_rows(recorded(prepare(load_scenario(scenario, list(settings))).run()))
 
 
 def same(rows: np.ndarray, expected: np.ndarray) -> None:
@@ -115,19 +114,32 @@ def test_reload_begins_as_the_file_is_now() -> None:
         assert studio.data.time == pytest.approx(before + 0.5)
 
 
-def test_back_in_time_the_controller_starts_afresh_and_later_pushes_are_forgotten() -> None:
+@pytest.mark.parametrize(("step_s", "frames"), [(0.005, 150), (0.001, 188)])
+def test_back_in_time_the_controller_goes_on_as_it_was_and_later_pushes_are_forgotten(
+    step_s: float, frames: int
+) -> None:
     """Studio's history has MuJoCo's states alone."""
-    with session("push=[]") as studio:
-        studio.run(1.0, every_s=0.004)
+    settings = ("duration_s=2.0", "push.0.start_s=0.8", f"plant.timestep_s={step_s}")
+    expected = runner_rows(*settings)
+    with session(*settings) as studio:
+        studio.run(1.2, every_s=0.004)
         studio.send(PushRequest(0.8, 0.1))
-        studio.run(1.0, every_s=0.004)
-        studio.scrub(-150)
+        studio.run(0.8, every_s=0.004)
+        studio.scrub(-frames)
         time = studio.data.time
         assert time == pytest.approx(0.5, abs=0.011)
         del studio.stepping.rows[:]
         studio.pause(False)
-        studio.run(1.5)
-        assert studio.session_state().note == f"the controller starts afresh at t = {time:g} s"
+        studio.run(1.4)
+        assert (studio.live.stopped, studio.live.note) == ("", "")
+        same(studio.rows, expected[expected[:, 0] > time - 1e-9])
+
+
+def test_where_it_has_not_been_the_controller_starts_afresh() -> None:
+    with session("push=[]") as studio:
+        studio.run(0.5)
+        studio.data.time = 1.0
+        studio.run(0.5)
+        assert studio.session_state().note == "the controller starts afresh at t = 1 s"
         assert not studio.live.stopped
-        assert np.count_nonzero(studio.rows[:, PUSH]) == 0
         assert np.abs(studio.rows[:, RATE]).max() < 0.3

@@ -10,6 +10,7 @@ import pytest
 from cmg_mj.core.errors import InputError
 from cmg_mj.runs.experiment import prepare
 from cmg_mj.scenario.loading import load_scenario
+from tests.recorded import recorded
 
 STANDS = ["gait.steps=0", "duration_s=2.0"]
 
@@ -23,10 +24,8 @@ def test_the_joints_follow_in_one_world_and_in_many(tmp_path: Path) -> None:
     """Both hips pitch by 0.02 rad together, so that the torso leans; without the track it does not."""
     text = "time_s,left/hip_pitch,right/hip_pitch\n0,0,0\n0.5,0,0\n0.9,0.02,0.02\n"
     prepared = prepare(load_scenario("walk", nod(tmp_path, text)))
-    alone = prepared.run(world=1).trajectory
-    many = prepared.run_many([0, 1]).trajectory
-    assert alone is not None
-    assert many is not None
+    alone = recorded(prepared.run(world=1))
+    many = recorded(prepared.run_many([0, 1]))
     hip = alone["angle/left/hip_pitch_rad"]
     at = alone["time_s"] >= 1.2
     np.testing.assert_allclose(hip[at], 0.02, atol=2e-3)

@@ -17,6 +17,7 @@ from cmg_mj.features.replay.reading import read_log
 from cmg_mj.features.tuning import tune_on_logs
 from tests.command import cmg_mj
 from tests.features.replay.motion import AMPLITUDE, COLUMNS, rate, sine, two_accelerometers, write_csv
+from tests.recorded import recorded
 
 PLAIN = ",".join(f"{role}={name}" for role, name in COLUMNS.items())
 SETTINGS = ["duration_s=1.4", "push.0.start_s=0.3", "observer.k1=23.0", "seed=5"]
@@ -32,10 +33,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The recording of a run."""
     path = tmp_path_factory.mktemp("runs") / "trajectory.parquet"
     experiment = prepare(load_scenario("push_recovery", SETTINGS))
-    trajectory = experiment.run().trajectory
-    assert trajectory is not None
     metadata = {"scenario": experiment.resolved()}
-    dataclasses.replace(trajectory, metadata=metadata).save(path)
+    dataclasses.replace(recorded(experiment.run()), metadata=metadata).save(path)
     return path
 
 

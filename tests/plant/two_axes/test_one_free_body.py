@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pytest
 
 from cmg_mj.features.mounting import mount
 from cmg_mj.plant.tilt_line import SupportLine
 from cmg_mj.runs.experiment import Experiment, prepare
 from cmg_mj.scenario.loading import load_scenario
+from tests.recorded import assert_same_bits, recorded
 
 POST = """
 <mujoco model="post">
@@ -53,14 +53,10 @@ def pushed(model: Path, **torques: float) -> Experiment:
 @pytest.mark.parametrize(("axis", "other"), [("roll", "pitch"), ("pitch", "roll")])
 def test_a_push_about_either_axis_is_felt_there(model: Path, axis: str, other: str) -> None:
     without = pushed(model)
-    quiet = without.run().trajectory
+    quiet = recorded(without.run())
     experiment = pushed(model, **{axis: 12.0})
-    one, many = experiment.run().trajectory, experiment.run_many(2).trajectory
-    assert quiet is not None
-    assert one is not None
-    assert many is not None
-    for name, values in one.columns.items():
-        np.testing.assert_array_equal(many.world(0)[name], values, err_msg=name)
+    one = recorded(experiment.run())
+    assert_same_bits(recorded(experiment.run_many(2)).world(0), one)
     after = round(0.25 / 0.005)
     rate = {name: one[f"{name}/x2_rad_s"][after] - quiet[f"{name}/x2_rad_s"][after] for name in (axis, other)}
     plant = without.plant

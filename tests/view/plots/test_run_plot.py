@@ -21,6 +21,7 @@ from cmg_mj.stages.swing import Swing
 from cmg_mj.view.plots.run_plot import plot_run
 from cmg_mj.view.plots.style import colour, hexadecimal
 from cmg_mj.view.recording import RecordingHeader, Run
+from tests.recorded import recorded
 
 BAND, LIMIT = 1.0, 4.7
 PUSHES = [Push(0.2, 0.1)]
@@ -31,8 +32,7 @@ def all_observers() -> tuple[Trajectory, dict[str, Any]]:
     """A short run with every observer."""
     short = ("duration_s=0.4", "push.0.start_s=0.2")
     result = prepare(load_scenario("observer_tuning", short)).run()
-    assert result.trajectory is not None
-    return result.trajectory, result.summaries[0]
+    return recorded(result), result.summaries[0]
 
 
 @pytest.fixture

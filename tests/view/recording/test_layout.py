@@ -23,6 +23,7 @@ from cmg_mj.view.recording.layout import EYE, pages
 from cmg_mj.view.recording.run import legend, numbered_parts
 from cmg_mj.view.recording.scene import MAX_TRAVEL, enclosing_ball
 from cmg_mj.view.recording.signals import make_branches
+from tests.recorded import recorded
 
 SHORT = ("duration_s=0.6", "push.0.start_s=0.2")
 FIELD_OF_VIEW = math.radians(55.0)
@@ -64,9 +65,8 @@ def select(layout: Sequence[View], name: str) -> list[View]:
 
 def record(experiment: Experiment) -> Run:
     result = experiment.run()
-    assert result.trajectory is not None
     summary = report_run(experiment, result).summary
-    return Run(experiment.scenario.observer.kind, result.trajectory, summary, result.outcomes[0])
+    return Run(experiment.scenario.observer.kind, recorded(result), summary, result.outcomes[0])
 
 
 def write(path: Path, experiment: Experiment, runs: Sequence[Run]) -> Path:

@@ -30,6 +30,7 @@ from cmg_mj.view.recording import RecordingHeader, Run, write_recording
 from cmg_mj.view.recording.run import phases
 from cmg_mj.view.recording.save import pipe_into
 from cmg_mj.view.recording.scene import FLYWHEEL_SLOWDOWN, POSE_RATE_HZ
+from tests.recorded import assert_same_bits, recorded
 
 SHORT = ("duration_s=0.5", "push.0.start_s=0.2", "push.0.duration_s=0.1", 'open_loop_observers=["linear"]')
 NANOSECONDS = 1e9
@@ -42,9 +43,8 @@ def scenario(*overrides: str) -> Scenario:
 
 def record(experiment: Experiment, name: str | None = None) -> Run:
     result = experiment.run()
-    assert result.trajectory is not None
     name = name or experiment.scenario.observer.kind
-    return Run(name, result.trajectory, result.summaries[0], result.outcomes[0])
+    return Run(name, recorded(result), result.summaries[0], result.outcomes[0])
 
 
 def write(path: Path, experiment: Experiment, runs: list[Run]) -> Path:
@@ -334,20 +334,16 @@ def test_a_viewer_receives_the_run_while_it_goes_on(name: str, tmp_path: Path, m
     monkeypatch.setattr(rr.RecordingStream, "connect_grpc", lambda rec: rec.save(path))
     experiment = prepare(load_scenario(name, ["duration_s=0.5", "push=[]"]))
     view = LiveView(recording_header(experiment), experiment.scenario.observer.kind)
-    result = experiment.run(**view.options(lambda _: None))
+    trajectory = recorded(experiment.run(**view.options(lambda _: None)))
     view.show()
     view._rec.disconnect()
-    trajectory = result.trajectory
-    alone = experiment.run().trajectory
-    assert trajectory is not None
-    assert alone is not None
     runs = {f"/{i}_{axis}": trajectory.along(axis) for i, axis in enumerate(trajectory.axes, 1)}
     for branch, columns in (runs or {"/homogeneous": trajectory}).items():
         times, rate = scalars(path, f"{branch}/rate/true")
         assert np.array_equal(rate, columns["x2_rad_s"])
         np.testing.assert_allclose(times, columns["time_s"], atol=1e-9)
         assert len(column(path, f"{branch}/rig/frame", "Transform3D:translation")[0]) > 10
-    assert all(np.array_equal(trajectory[name], alone[name]) for name in trajectory.columns)
+    assert_same_bits(trajectory, recorded(experiment.run()))
 
 
 def test_a_full_disk_is_an_error_and_nobody_waits() -> None:

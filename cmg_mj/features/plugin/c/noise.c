@@ -118,11 +118,6 @@ static void seed_words(double seed, double world, int stream, uint32_t words[8])
     for (int i = 0; i < 8; ++i) words[i] = hashed(pool[i % POOL], &constant, UINT32_C(0x58f38ded));
 }
 
-int noise_is_started(const double generator[NOISE_WORDS])
-{
-    return generator[4] != 0.0;
-}
-
 void noise_start(double generator[NOISE_WORDS], double seed, double world, int stream)
 {
     uint32_t words[8];
@@ -142,4 +137,21 @@ void noise_normals(double generator[NOISE_WORDS], double *normals, int n)
     pcg64 rng = {joined(generator), joined(generator + 4)};
     for (int i = 0; i < n; ++i) normals[i] = normal(&rng);
     split(rng.state, generator);
+}
+
+double noise_mean(
+    double generator[NOISE_WORDS], int width, void (*step)(double *memory, const double *normals, double *result),
+    double *memory, int samples, int piece)
+{
+    double normals[width], result, mean = 0.0;
+    for (int from = 0; from < samples; from += piece) {
+        double sum = 0.0;
+        for (int i = 0; i < piece && from + i < samples; ++i) {
+            noise_normals(generator, normals, width);
+            step(memory, normals, &result);
+            sum = i ? sum + result : result;
+        }
+        mean = mean + sum / samples;
+    }
+    return mean;
 }

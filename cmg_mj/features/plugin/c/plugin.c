@@ -15,19 +15,19 @@ static double *state_of(const mjModel *m, mjData *d, int instance)
 static int nstate(const mjModel *m, int instance)
 {
     (void)m, (void)instance;
-    return 2 * state_size(&rig);
+    return 2 * rig.size;
 }
 
 static int nsensordata(const mjModel *m, int instance, int sensor)
 {
-    return shown_size(&rig, m, instance, sensor);
+    return shown_size(m, instance, sensor);
 }
 
 static int init(const mjModel *m, mjData *d, int instance)
 {
     char message[MESSAGE] = "";
     d->plugin_data[instance] = 0;
-    if (setup(&rig, m, instance, state_of(m, d, instance), message)) return 0;
+    if (setup(m, instance, state_of(m, d, instance), message)) return 0;
     mju_warning("%s: %s", rig.plugin, message);
     return -1;
 }
@@ -36,7 +36,7 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
 {
     char message[MESSAGE] = "";
     (void)data;
-    if (setup(&rig, m, instance, state, message)) return;
+    if (setup(m, instance, state, message)) return;
     mju_warning("%s: %s; nothing is controlled", rig.plugin, message);
     state[STATUS] = UNREADY;
 }
@@ -44,15 +44,11 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
 /* u = 0 from now on, until a reset. */
 static void fail(double *state, const char *why)
 {
-    axis_places places;
-    int at = HEAD;
     mju_warning("%s: %s; u = 0 from now on", rig.plugin, why);
     state[STATUS] = FAILED;
     state[IS_PENDING] = 0;
-    for (int i = 0; i < rig.axes; ++i) {
-        at = axis_place(rig.axis[i], at, &places);
-        state[places.held] = state[places.rate] = state[places.shown + SHOWN_U] = 0;
-    }
+    for (int i = 0; i < rig.axes; ++i)
+        state[rig.held + i] = state[rig.rate + i] = state[rig.axis[i].shown + SHOWN_U] = 0;
 }
 
 /* A program has written into the state what cannot be there: begin anew, at rest. */
@@ -74,15 +70,12 @@ static double limited(const mjModel *m, int actuator, double control)
 static void actuator_act_dot(const mjModel *m, mjData *d, int instance)
 {
     const double *state = state_of(m, d, instance);
-    axis_places places;
-    int at = HEAD;
     if (state[STATUS] == UNREADY) return;
     for (int i = 0; i < rig.axes; ++i) {
-        const axis_type *axis = rig.axis[i];
-        at = axis_place(axis, at, &places);
-        const double rate = is_rate(axis, state[places.rate]) ? state[places.rate] : 0.0;
+        const axis_type *axis = &rig.axis[i];
+        const double rate = is_rate(i, state[rig.rate + i]) ? state[rig.rate + i] : 0.0;
         for (int j = 0; j < axis->gimbals; ++j) {
-            const int servo = element(state[places.servos + j], (int)m->nactuator);
+            const int servo = element(state[axis->servos + j], (int)m->nactuator);
             const int act = servo < 0 ? -1 : m->actuator_actadr[servo];
             if (act >= 0) d->act_dot[act] = limited(m, servo, axis->modules[j].direction * rate);
         }
@@ -92,13 +85,10 @@ static void actuator_act_dot(const mjModel *m, mjData *d, int instance)
 /* The flywheels' motors: their force at the nominal speed. */
 static void drive_flywheels(const mjModel *m, mjData *d, const double *state)
 {
-    axis_places places;
-    int at = HEAD;
     for (int i = 0; i < rig.axes; ++i) {
-        const axis_type *axis = rig.axis[i];
-        at = axis_place(axis, at, &places);
+        const axis_type *axis = &rig.axis[i];
         for (int j = 0; j < axis->gimbals; ++j) {
-            const int motor = element(state[places.motors + j], (int)m->nactuator);
+            const int motor = element(state[axis->motors + j], (int)m->nactuator);
             if (motor < 0) continue;
             const int out = m->actuator_outadr[motor];
             const double *bias = m->actuator_biasprm + mjNBIAS * motor;
@@ -126,36 +116,16 @@ static void sense(const mjModel *m, mjData *d)
     mj_freeStack(d);
 }
 
-/* Take numbers at places that the state names; 0 if one is missing or no number. */
-static int take(const double *places, int n, const double *from, int size, double *inputs)
-{
-    int is_finite = 1;
-    for (int i = 0; i < n; ++i) {
-        const int place = element(places[i], size);
-        inputs[i] = place < 0 ? (double)NAN : from[place];
-        is_finite = is_finite && isfinite(inputs[i]);
-    }
-    return is_finite;
-}
-
+/* Take the numbers at the places that the state names; 0 if one is missing or no number. */
 static int read_inputs(const mjModel *m, const mjData *d, double *state)
 {
-    const int n = (int)m->nsensordata;
-    axis_places places;
-    turning_places turning;
-    int at = HEAD, is_finite = 1;
-    for (int i = 0; i < rig.axes; ++i) {
-        const axis_type *axis = rig.axis[i];
-        at = axis_place(axis, at, &places);
-        is_finite &= take(state + places.forces, FORCES + axis->gimbals, d->sensordata, n, state + places.inputs);
-        if (reads_gyro(axis))
-            is_finite &= take(state + places.gyro_from, 1, d->sensordata, n, state + places.gyro);
-        if (axis->controller->feedback == FEEDBACK_TRUTH)
-            is_finite &= take(state + places.rates_from, axis->dofs, d->qvel, (int)m->nv, state + places.rates);
-    }
-    if (rig.turning) {
-        (void)turning_place(rig.turning, at, &turning);
-        is_finite &= take(state + turning.rate_from, 1, d->sensordata, n, state + turning.rate);
+    int is_finite = 1;
+    for (int i = 0; i < rig.inputs; ++i) {
+        const int is_rate = rig.input[i].is_rate;
+        const int place = element(state[rig.from + i], (int)(is_rate ? m->nv : m->nsensordata));
+        double *input = state + rig.taken + i;
+        *input = place < 0 ? (double)NAN : is_rate ? d->qvel[place] : d->sensordata[place];
+        is_finite = is_finite && isfinite(*input);
     }
     return is_finite;
 }
@@ -163,36 +133,24 @@ static int read_inputs(const mjModel *m, const mjData *d, double *state)
 /* Decide on the inputs, in the state's second half: all but what is commanded and shown counts once a step is taken. */
 static int decide(double *state)
 {
-    const int size = state_size(&rig);
-    double *decided = state + size;
-    axis_places places;
-    int at = HEAD;
-    memcpy(decided, state, (size_t)size * sizeof *state);
-    const int is_good = state_advance(&rig, decided);
-    for (int i = 0; i < rig.axes; ++i) {
-        at = axis_place(rig.axis[i], at, &places);
-        state[places.rate] = decided[places.rate];
-        memcpy(state + places.shown, decided + places.shown,
-            (size_t)(SHOWN_ESTIMATE + rig.axis[i]->controller->estimates) * sizeof *state);
-    }
+    double *decided = state + rig.size;
+    memcpy(decided, state, (size_t)rig.size * sizeof *state);
+    const int is_good = state_advance(decided);
+    memcpy(state + rig.rate, decided + rig.rate, (size_t)rig.axes * sizeof *state);
+    memcpy(state + rig.shown, decided + rig.shown, (size_t)(rig.memory - rig.shown) * sizeof *state);
     return is_good;
 }
 
 static void take_instant(const mjModel *m, mjData *d, double *state)
 {
-    axis_places places;
-    int at = HEAD;
     state[IS_PENDING] = 0;
-    for (int i = 0; i < rig.axes; ++i) {
-        at = axis_place(rig.axis[i], at, &places);
-        state[places.rate] = state[places.held];
-    }
+    memcpy(state + rig.rate, state + rig.held, (size_t)rig.axes * sizeof *state);
     if (m->opt.timestep != state[TIMESTEP]) {
         fail(state, "the physics step was changed");
         return;
     }
     if (fmod(state[STEPS], state[PER_INSTANT]) != 0.0) return;
-    if (!state_is_finite(&rig, state)) {
+    if (!state_is_finite(state)) {
         fail(state, "a number in its state is none");
         return;
     }
@@ -219,7 +177,7 @@ static int start_spinning(const mjModel *m, mjData *d, int instance)
     for (int i = 0; i < instance; ++i)
         if (m->plugin[i] == slot && is_to_spin(m, d, i)) return 0;
     for (int i = instance; i < m->nplugin; ++i)
-        if (m->plugin[i] == slot && is_to_spin(m, d, i)) spin(&rig, m, d, i);
+        if (m->plugin[i] == slot && is_to_spin(m, d, i)) spin(m, d, i);
     state[IS_SPINNING_UP] = 1;
     mj_fwdPosition(m, d);
     mj_sensorPos(m, d);
@@ -237,10 +195,10 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
         drive_flywheels(m, d, state);
         return;
     }
-    if (!state_is_intact(&rig, state)) restore(m, state, instance);
+    if (!state_is_intact(state)) restore(m, state, instance);
     if (is_to_spin(m, d, instance) && start_spinning(m, d, instance)) return;
     if (state[STATUS] == READY) take_instant(m, d, state);
-    show(&rig, m, state, d->sensordata);
+    show(m, state, d->sensordata);
 }
 
 /* Whether MuJoCo leaves an actuator out that the state names. */
@@ -252,13 +210,10 @@ static int is_off(const mjModel *m, double number)
 
 static int drives_are_off(const mjModel *m, const double *state)
 {
-    axis_places places;
-    int at = HEAD, result = (m->opt.disableflags & mjDSBL_ACTUATION) != 0;
-    for (int i = 0; i < rig.axes; ++i) {
-        at = axis_place(rig.axis[i], at, &places);
-        for (int j = 0; j < rig.axis[i]->gimbals; ++j)
-            result = result || is_off(m, state[places.servos + j]) || is_off(m, state[places.motors + j]);
-    }
+    int result = (m->opt.disableflags & mjDSBL_ACTUATION) != 0;
+    for (int i = 0; i < rig.axes; ++i)
+        for (int j = 0; j < rig.axis[i].gimbals; ++j)
+            result = result || is_off(m, state[rig.axis[i].servos + j]) || is_off(m, state[rig.axis[i].motors + j]);
     return result;
 }
 
@@ -266,20 +221,14 @@ static int drives_are_off(const mjModel *m, const double *state)
 static void advance(const mjModel *m, mjData *d, int instance)
 {
     double *state = state_of(m, d, instance);
-    axis_places places;
-    int at = HEAD;
     if (state[STATUS] != READY) return;
     if (drives_are_off(m, state)) {
         fail(state, "its drives were switched off during a step");
         return;
     }
     if (state[IS_PENDING] != 0.0) {
-        const int size = state_size(&rig);
-        memcpy(state + HEAD, state + size + HEAD, (size_t)(size - HEAD) * sizeof *state);
-        for (int i = 0; i < rig.axes; ++i) {
-            at = axis_place(rig.axis[i], at, &places);
-            state[places.held] = state[places.rate];
-        }
+        memcpy(state + HEAD, state + rig.size + HEAD, (size_t)(rig.size - HEAD) * sizeof *state);
+        memcpy(state + rig.held, state + rig.rate, (size_t)rig.axes * sizeof *state);
         state[IS_PENDING] = 0;
     } else if (fmod(state[STEPS], state[PER_INSTANT]) == 0.0) {
         fail(state, "a step without its sensors (are they switched off?)");

@@ -74,9 +74,10 @@ static int find_sensor(const search *in, const char *first, const char *last, in
     return 1;
 }
 
-static int find_encoder(const search *in, const char *name, int gimbal, double *place)
+static int find_encoder(const search *in, const char *name, int gimbal)
 {
-    if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, place)) return 0;
+    double place;
+    if (!find_sensor(in, name, "/gimbal_encoder", mjSENS_JOINTPOS, &place)) return 0;
     const int id = find(in, mjOBJ_SENSOR, "sensor", name, "/gimbal_encoder");
     if (in->m->sensor_objid[id] == gimbal) return 1;
     return refuse(in, "sensor '%s/gimbal_encoder' must be of joint '%s/gimbal'", name, name);
@@ -105,33 +106,29 @@ static int find_actuator(
     return 1;
 }
 
-static int find_axis(const search *in, const axis_type *axis, const axis_places *places, double *state)
+static int find_input(const search *in, const input_type *input, double *place)
 {
-    double inner, outer;
-    if (!find_sensor(in, axis->prefix, "accelerometer_inner", mjSENS_ACCELEROMETER, &inner)) return 0;
-    if (!find_sensor(in, axis->prefix, "accelerometer_outer", mjSENS_ACCELEROMETER, &outer)) return 0;
-    const double forces[FORCES] = {inner, inner + 2, outer, outer + 2};
-    memcpy(state + places->forces, forces, sizeof forces);
-    if (reads_gyro(axis)) {
-        double *from = state + places->gyro_from;
-        if (!find_sensor(in, axis->prefix, "fog", mjSENS_GYRO, from)) return 0;
-        *from += 1; /* its y axis */
-    }
-    if (axis->controller->feedback == FEEDBACK_TRUTH) {
-        const int is_free = axis->dofs > 1;
-        const int joint = find_joint(in, axis->joint, "", is_free ? mjJNT_FREE : mjJNT_HINGE);
+    if (input->is_rate) {
+        const int joint = find_joint(in, input->name, "", input->kind);
         if (joint < 0) return 0;
-        const int first = in->m->jnt_dofadr[joint] + (is_free ? 3 : 0);
-        for (int i = 0; i < axis->dofs; ++i) state[places->rates_from + i] = first + i;
+        *place = in->m->jnt_dofadr[joint];
+    } else if (!find_sensor(in, input->name, "", input->kind, place)) {
+        return 0;
     }
+    *place += input->offset;
+    return 1;
+}
+
+static int find_modules(const search *in, const axis_type *axis, double *state)
+{
     for (int i = 0; i < axis->gimbals; ++i) {
         const char *name = axis->modules[i].name;
+        double *servo = &state[axis->servos + i], *motor = &state[axis->motors + i];
         const int gimbal = find_joint(in, name, "/gimbal", mjJNT_HINGE);
         const int flywheel = gimbal < 0 ? -1 : find_joint(in, name, "/flywheel", mjJNT_HINGE);
-        if (flywheel < 0) return 0;
-        if (!find_encoder(in, name, gimbal, &state[places->encoders + i])) return 0;
-        if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, gimbal, &state[places->servos + i])) return 0;
-        if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, flywheel, &state[places->motors + i])) return 0;
+        if (flywheel < 0 || !find_encoder(in, name, gimbal)) return 0;
+        if (!find_actuator(in, name, "/gimbal_servo", mjDYN_INTEGRATOR, gimbal, servo)) return 0;
+        if (!find_actuator(in, name, "/flywheel_motor", mjDYN_NONE, flywheel, motor)) return 0;
     }
     return 1;
 }
@@ -155,37 +152,32 @@ static int configured(const search *in, int instance, int key, double otherwise,
     return 1;
 }
 
-static int configure(const search *in, int instance, const rig_type *type, double *state)
+static int configure(const search *in, int instance, double *state)
 {
     const double unset = -1.0, most = 1e9;
     double density, force_counts, angle_counts;
     const char *build = mj_getPluginConfig(in->m, instance, setup_keys[KEY_BUILD]);
     const char *start = mj_getPluginConfig(in->m, instance, setup_keys[KEY_START]);
-    const char *copies = mj_getPluginConfig(in->m, instance, type->build);
-    axis_places places;
-    int at = HEAD;
+    const char *copies = mj_getPluginConfig(in->m, instance, rig.build);
     state[STARTS_SPINNING] = start && !strcmp(start, "spinning");
     if (start && *start && state[STARTS_SPINNING] == 0.0 && strcmp(start, "keyframe"))
         return refuse(in, "<config key=\"start\" value=\"%.40s\">: must be keyframe or spinning", start);
-    if (build && *build && strcmp(build, type->build))
-        return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, type->build);
+    if (build && *build && strcmp(build, rig.build))
+        return refuse(in, "the model was written with another library (build %.40s, and this is %s)", build, rig.build);
     if (copies && *copies)
-        return refuse(in, "<config key=\"%s\">: must have no value", type->build);
-    if (!configured(in, instance, KEY_SEED, type->seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
-    if (!configured(in, instance, KEY_WORLD, type->world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
+        return refuse(in, "<config key=\"%s\">: must have no value", rig.build);
+    if (!configured(in, instance, KEY_SEED, rig.seed, NOISE_LARGEST, 1, &state[SEED])) return 0;
+    if (!configured(in, instance, KEY_WORLD, rig.world, NOISE_LARGEST, 1, &state[WORLD])) return 0;
     if (!configured(in, instance, KEY_NOISE, unset, most, 0, &density)) return 0;
     if (!configured(in, instance, KEY_FORCE_COUNTS, unset, most, 0, &force_counts)) return 0;
     if (!configured(in, instance, KEY_ANGLE_COUNTS, unset, most, 0, &angle_counts)) return 0;
-    for (int i = 0; i < type->axes; ++i) {
-        const axis_type *axis = type->axis[i];
-        at = axis_place(axis, at, &places);
-        double *settings = state + places.settings;
-        settings[0] = axis->settings.force_sigma;
-        settings[1] = axis->settings.force_step;
-        settings[2] = axis->settings.angle_step;
-        if (density >= 0.0) settings[0] = density * 1e-6 * STANDARD_GRAVITY * sqrt(axis->raw_rate / 2.0);
-        if (force_counts >= 0.0) settings[1] = force_counts > 0.0 ? STANDARD_GRAVITY / force_counts : 0.0;
-        if (angle_counts >= 0.0) settings[2] = angle_counts > 0.0 ? TURN / angle_counts : 0.0;
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = &rig.axis[i];
+        double *settings = state + axis->settings;
+        memcpy(settings, axis->unless_configured, sizeof axis->unless_configured);
+        if (density >= 0.0) settings[FORCE_SIGMA] = density * 1e-6 * STANDARD_GRAVITY * sqrt(axis->raw_rate / 2.0);
+        if (force_counts >= 0.0) settings[FORCE_STEP] = force_counts > 0.0 ? STANDARD_GRAVITY / force_counts : 0.0;
+        if (angle_counts >= 0.0) settings[ANGLE_STEP] = angle_counts > 0.0 ? TURN / angle_counts : 0.0;
     }
     return 1;
 }
@@ -196,14 +188,14 @@ static const char *const quantities[QUANTITIES] = {
     "estimate", "command", "tilt", "gimbal_angle", "acceleration", "integrator", "sample"};
 
 /* -1 if it is no sensor of the instance's. */
-static int quantity_of(const rig_type *type, const mjModel *m, int instance, int sensor, int *which)
+static int quantity_of(const mjModel *m, int instance, int sensor, int *which)
 {
     const char *owner = instance_name(m, instance), *name = m->names + m->name_sensoradr[sensor];
     const size_t length = strlen(owner);
     if (strncmp(name, owner, length) || name[length] != '/') return -1;
     name += length + 1;
-    for (int i = 0; i < type->axes; ++i) {
-        const char *prefix = type->axis[i]->prefix;
+    for (int i = 0; i < rig.axes; ++i) {
+        const char *prefix = rig.axis[i].prefix;
         if (strncmp(name, prefix, strlen(prefix))) continue;
         for (int quantity = 0; quantity < QUANTITIES; ++quantity)
             if (!strcmp(name + strlen(prefix), quantities[quantity])) {
@@ -214,62 +206,54 @@ static int quantity_of(const rig_type *type, const mjModel *m, int instance, int
     return -1;
 }
 
-static int find_shown(const search *in, const rig_type *type, int instance, const axis_places *places, double *state)
+static int find_shown(const search *in, int instance, double *state)
 {
     const mjModel *m = in->m;
     int which = 0;
-    for (int i = 0; i < type->axes; ++i)
-        for (int quantity = 0; quantity < QUANTITIES; ++quantity) state[places[i].shows + quantity] = -1.0;
+    for (int i = 0; i < rig.axes; ++i)
+        for (int quantity = 0; quantity < QUANTITIES; ++quantity) state[rig.axis[i].shows + quantity] = -1.0;
     for (int i = 0; i < m->nsensor; ++i) {
         if (m->sensor_type[i] != mjSENS_PLUGIN || m->sensor_plugin[i] != instance) continue;
-        const int quantity = quantity_of(type, m, instance, i, &which);
+        const int quantity = quantity_of(m, instance, i, &which);
         if (quantity < 0)
             return refuse(in, "sensor '%s': must be named '%s/' and, of several axes, 'AXIS/', and then estimate, "
                 "command, tilt, gimbal_angle, acceleration, integrator or sample", m->names + m->name_sensoradr[i],
                 instance_name(m, instance));
-        state[places[which].shows + quantity] = m->sensor_adr[i];
+        state[rig.axis[which].shows + quantity] = m->sensor_adr[i];
     }
     return 1;
 }
 
-int setup(const rig_type *type, const mjModel *m, int instance, double *state, char message[MESSAGE])
+int setup(const mjModel *m, int instance, double *state, char message[MESSAGE])
 {
     const char *name = instance_name(m, instance);
     const search in = {m, name, prefix_length(name), message};
-    const double step = m->opt.timestep, steps = floor(type->instant / step + 0.5);
-    axis_places places[MOST_AXES];
-    int at = HEAD;
-    memset(state, 0, 2 * (size_t)state_size(type) * sizeof *state);
+    const double step = m->opt.timestep, steps = floor(rig.instant / step + 0.5);
+    memset(state, 0, 2 * (size_t)rig.size * sizeof *state);
     if (in.prefix_length < 0) return refuse(&in, "the instance must be named '%s', or PREFIX%s", INSTANCE, INSTANCE);
     if (m->opt.disableflags & mjDSBL_SENSOR) return refuse(&in, "<flag sensor=\"disable\"/> leaves the controller blind");
     if (m->opt.disableflags & mjDSBL_ACTUATION) return refuse(&in, "<flag actuation=\"disable\"/> holds its drives");
-    if (!(steps >= 1.0 && fabs(steps * step - type->instant) <= 1e-9 * type->instant))
-        return refuse(&in, "a physics step of %g s: must divide %g s", step, type->instant);
-    for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places[i]);
-        if (!find_axis(&in, type->axis[i], &places[i], state)) return 0;
-    }
-    if (type->turning) {
-        turning_places turning;
-        (void)turning_place(type->turning, at, &turning);
-        if (!find_sensor(&in, type->axis[0]->prefix, "fog", mjSENS_GYRO, &state[turning.rate_from])) return 0;
-        state[turning.rate_from] += 2; /* its z axis, upward */
-    }
-    if (!find_shown(&in, type, instance, places, state) || !configure(&in, instance, type, state)) return 0;
+    if (!(steps >= 1.0 && fabs(steps * step - rig.instant) <= 1e-9 * rig.instant))
+        return refuse(&in, "a physics step of %g s: must divide %g s", step, rig.instant);
+    for (int i = 0; i < rig.inputs; ++i)
+        if (!find_input(&in, &rig.input[i], &state[rig.from + i])) return 0;
+    for (int i = 0; i < rig.axes; ++i)
+        if (!find_modules(&in, &rig.axis[i], state)) return 0;
+    if (!find_shown(&in, instance, state) || !configure(&in, instance, state)) return 0;
     state[STATUS] = READY;
     state[PER_INSTANT] = steps;
     state[TIMESTEP] = step;
-    state[CHECK] = state_constants(type, state);
+    state[CHECK] = state_constants(state);
     return 1;
 }
 
-void spin(const rig_type *type, const mjModel *m, mjData *d, int instance)
+void spin(const mjModel *m, mjData *d, int instance)
 {
     char message[MESSAGE];
     const char *name = instance_name(m, instance);
     const search in = {m, name, prefix_length(name), message};
-    for (int i = 0; i < type->axes; ++i) {
-        const axis_type *axis = type->axis[i];
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = &rig.axis[i];
         for (int j = 0; j < axis->gimbals; ++j) {
             const module_type *module = &axis->modules[j];
             const int gimbal = find(&in, mjOBJ_JOINT, "joint", module->name, "/gimbal");
@@ -283,27 +267,25 @@ void spin(const rig_type *type, const mjModel *m, mjData *d, int instance)
     }
 }
 
-int shown_size(const rig_type *type, const mjModel *m, int instance, int sensor)
+int shown_size(const mjModel *m, int instance, int sensor)
 {
     int which = 0;
-    const int quantity = quantity_of(type, m, instance, sensor, &which);
-    return quantity < 0 ? 0 : quantity == ESTIMATE ? type->axis[which]->controller->estimates : 1;
+    const int quantity = quantity_of(m, instance, sensor, &which);
+    return quantity < 0 ? 0 : quantity == ESTIMATE ? rig.axis[which].estimates : 1;
 }
 
-void show(const rig_type *type, const mjModel *m, const double *state, double *sensordata)
+void show(const mjModel *m, const double *state, double *sensordata)
 {
     static const int PLACE[QUANTITIES] = {
         SHOWN_ESTIMATE, SHOWN_U, SHOWN_Y1, SHOWN_Y2, SHOWN_ACCELERATION, SHOWN_X_E, 0};
-    axis_places places;
-    int at = HEAD;
-    for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places);
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = &rig.axis[i];
         for (int quantity = 0; quantity < QUANTITIES; ++quantity) {
-            const int n = quantity == ESTIMATE ? type->axis[i]->controller->estimates : 1;
-            const int place = element(state[places.shows + quantity], (int)m->nsensordata - n + 1);
+            const int n = quantity == ESTIMATE ? axis->estimates : 1;
+            const int place = element(state[axis->shows + quantity], (int)m->nsensordata - n + 1);
             if (place < 0) continue;
-            if (quantity == SAMPLE) sensordata[place] = floor(state[STEPS] / state[PER_INSTANT] / type->period);
-            else memcpy(sensordata + place, state + places.shown + PLACE[quantity], (size_t)n * sizeof *state);
+            if (quantity == SAMPLE) sensordata[place] = floor(state[STEPS] / state[PER_INSTANT] / rig.period);
+            else memcpy(sensordata + place, state + axis->shown + PLACE[quantity], (size_t)n * sizeof *state);
         }
     }
 }

@@ -1,93 +1,19 @@
-#include "state.h"
+#include "rig.h"
 
 #include "noise.h"
 
 #include <math.h>
 #include <string.h>
 
-int reads_gyro(const axis_type *axis)
-{
-    return axis->controller->feedback == FEEDBACK_FOG || axis->controller->reads_gyro;
-}
-
-int axis_place(const axis_type *axis, int at, axis_places *places)
-{
-    const int gimbals = axis->gimbals;
-    places->forces = at;
-    places->encoders = places->forces + FORCES;
-    places->servos = places->encoders + gimbals;
-    places->motors = places->servos + gimbals;
-    places->shows = places->motors + gimbals;
-    places->settings = places->shows + QUANTITIES;
-    places->held = places->settings + 3;
-    places->rate = places->held + 1;
-    places->inputs = places->rate + 1;
-    at = places->inputs + FORCES + gimbals;
-    if (reads_gyro(axis)) {
-        places->gyro_from = at++;
-        places->gyro = at++;
-    }
-    if (axis->controller->feedback == FEEDBACK_FOG) at = fog_place(&axis->fog, at, &places->fog);
-    if (axis->controller->reads_gyro) at = mems_gyro_place(at, &places->mems_gyro);
-    if (axis->controller->feedback == FEEDBACK_TRUTH) {
-        places->rates_from = at;
-        places->rates = at + axis->dofs;
-        at = places->rates + axis->dofs;
-    }
-    places->coriolis = at++;
-    places->shown = at;
-    at += SHOWN_ESTIMATE + axis->controller->estimates;
-    at = pair_place(&axis->pair, at, &places->pair);
-    at = encoder_place(&axis->encoder, at, &places->encoder);
-    return controller_place(axis->controller, at, &places->controller);
-}
-
-int turning_place(const turning_type *turning, int at, turning_places *places)
-{
-    if (!turning) return at;
-    places->rate_from = at++;
-    places->rate = at++;
-    return mems_gyro_place(at, &places->gyro);
-}
-
 int element(double number, int n)
 {
     return number >= 0.0 && number < n ? (int)number : -1;
 }
 
-int state_size(const rig_type *type)
+double state_constants(const double *s)
 {
-    axis_places places;
-    turning_places turning;
-    int at = HEAD;
-    for (int i = 0; i < type->axes; ++i) at = axis_place(type->axis[i], at, &places);
-    return turning_place(type->turning, at, &turning);
-}
-
-static double sum_of(const double *numbers, int n)
-{
-    double sum = 0.0;
-    for (int i = 0; i < n; ++i) sum += numbers[i];
-    return sum;
-}
-
-double state_constants(const rig_type *type, const double *state)
-{
-    axis_places places;
-    turning_places turning;
-    int at = HEAD;
-    double sum = state[PER_INSTANT] + state[TIMESTEP] + state[STARTS_SPINNING];
-    for (int i = 0; i < type->axes; ++i) {
-        const axis_type *axis = type->axis[i];
-        at = axis_place(axis, at, &places);
-        sum += sum_of(state + places.forces, places.held - places.forces);
-        if (reads_gyro(axis)) sum += state[places.gyro_from];
-        if (axis->controller->feedback == FEEDBACK_TRUTH) sum += sum_of(state + places.rates_from, axis->dofs);
-    }
-    if (type->turning) {
-        (void)turning_place(type->turning, at, &turning);
-        sum += state[turning.rate_from];
-    }
+    double sum = s[PER_INSTANT] + s[TIMESTEP] + s[STARTS_SPINNING];
+    for (int i = HEAD; i < rig.held; ++i) sum += s[i];
     return sum;
 }
 
@@ -96,150 +22,85 @@ static int is_whole(double number)
     return number >= 0.0 && number <= NOISE_LARGEST && number == floor(number);
 }
 
-int is_rate(const axis_type *axis, double rate)
+int is_rate(int axis, double rate)
 {
-    return fabs(rate) <= 1.001 * axis->controller->rate_limit;
+    return fabs(rate) <= 1.001 * rig.axis[axis].rate_limit;
 }
 
-int state_is_intact(const rig_type *type, const double *state)
+int state_is_intact(const double *s)
 {
-    axis_places places;
-    int at = HEAD, is_intact = state[STATUS] == READY || state[STATUS] == FAILED;
-    for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places);
-        is_intact = is_intact && is_rate(type->axis[i], state[places.held]);
-    }
-    return is_intact && is_whole(state[SEED]) && is_whole(state[WORLD]) && is_whole(state[STEPS]) &&
-           state[CHECK] == state_constants(type, state);
+    int is_intact = s[STATUS] == READY || s[STATUS] == FAILED;
+    for (int i = 0; i < rig.axes; ++i) is_intact = is_intact && is_rate(i, s[rig.held + i]);
+    return is_intact && is_whole(s[SEED]) && is_whole(s[WORLD]) && is_whole(s[STEPS]) && s[CHECK] == state_constants(s);
 }
 
-static int are_finite(const double *numbers, int n)
+static int are_finite(const double *s, int from, int end)
 {
     int result = 1;
-    for (int i = 0; i < n; ++i) result &= isfinite(numbers[i]) != 0;
+    for (int i = from; i < end; ++i) result &= isfinite(s[i]) != 0;
     return result;
 }
 
-int state_is_finite(const rig_type *type, const double *state)
+int state_is_finite(const double *s)
 {
-    axis_places places;
-    int at = 0, result = 1, next = HEAD;
-    for (int i = 0; i < type->axes; ++i) {
-        next = axis_place(type->axis[i], next, &places);
-        result &= are_finite(state + at, places.shown - at);
-        at = places.shown + SHOWN_ESTIMATE + type->axis[i]->controller->estimates; /* a law may have no integrator */
-        result &= are_finite(state + at, next - at);
-        at = next;
-    }
-    return result & are_finite(state + at, state_size(type) - at);
+    return are_finite(s, 0, rig.shown) && are_finite(s, rig.memory, rig.size); /* a law may have no integrator */
 }
 
-/* The tilt rate that is not the observer's, if one is fed back. */
-static double other_rate(const axis_type *axis, const axis_places *places, double *state, double instant)
+static int is_due(double instant, int period)
 {
-    double rate = 0.0;
-    if (axis->controller->feedback == FEEDBACK_FOG) {
-        delivery_read(&axis->fog.delivery, &places->fog.delivery, state, instant, &rate);
-    } else if (axis->controller->feedback == FEEDBACK_TRUTH) {
-        for (int i = 0; i < axis->dofs; ++i) {
-            const double part = state[places->rates + i] * axis->shares[i];
-            rate = i ? rate + part : part;
-        }
-    }
-    return rate;
+    return fmod(instant, period) == 0.0;
 }
 
-static int axis_decide(
-    const axis_type *axis, const axis_places *places, double *state, double instant, decision *result)
+/* Put a row of numbers before others, of which the last one goes. */
+static void shift(double *rows, int n, int width, const double *row)
 {
-    double forces[FORCES], angles[MOST_GIMBALS];
-    delivery_read(&axis->pair.delivery, &places->pair.delivery, state, instant, forces);
-    delivery_read(&axis->encoder.delivery, &places->encoder, state, instant, angles);
-    const double rate = other_rate(axis, places, state, instant);
-    double gyro = 0.0;
-    if (axis->controller->reads_gyro)
-        gyro = mems_gyro_read(
-            &axis->mems_gyro, &places->mems_gyro, state, state[SEED], state[WORLD], state[places->gyro]);
-    const controller_inputs inputs = {forces, angles, rate, state[places->coriolis], gyro};
-    return controller_decide(axis->controller, &places->controller, state, &inputs, result);
+    const size_t size = (size_t)width * sizeof *rows;
+    memmove(rows + width, rows, (size_t)(n - 1) * size);
+    memcpy(rows, row, size);
 }
 
-static void axis_sample(const axis_type *axis, const axis_places *places, double *state, double instant)
+/* Take what is due, as `Sensor.init` and `Sensor.sample` of cmg_mj/core/sensor.py do. */
+static void sample(const sensor_type *sensor, double *s, double instant)
 {
-    const double *inputs = state + places->inputs, *numbers = state + places->settings;
-    const sensor_settings settings = {numbers[0], numbers[1], numbers[2]};
-    const double seed = state[SEED], world = state[WORLD];
-    pair_sample(&axis->pair, &places->pair, state, &settings, seed, world, instant, inputs);
-    encoder_sample(&axis->encoder, &places->encoder, state, &settings, instant, inputs + FORCES);
-    if (axis->controller->feedback == FEEDBACK_FOG)
-        fog_sample(&axis->fog, &places->fog, state, seed, world, instant, state[places->gyro]);
+    double x[sensor->channels], y[sensor->width];
+    const int is_first = instant == 0.0, is_taken = is_due(instant, sensor->raw);
+    const int is_older = sensor->skew && !is_first && is_due(instant + sensor->skew, sensor->raw);
+    const int half = sensor->channels / 2, last = (sensor->older_kept - 1) * sensor->channels;
+    if (!is_taken && !is_older) return;
+    sensor->ideal(s, x, x);
+    for (int i = 0; i < (is_first ? sensor->older_kept : is_older); ++i)
+        shift(s + sensor->older, sensor->older_kept, sensor->channels, x);
+    if (!is_taken) return;
+    if (sensor->skew) memcpy(x + half, s + sensor->older + last + half, (size_t)(sensor->channels - half) * sizeof *x);
+    (is_first ? sensor->init : sensor->take)(s, x, y);
+    for (int i = 0; is_first && i < sensor->settling; ++i) sensor->take(s, x, y);
+    for (int i = 0; i < (is_first ? sensor->kept : is_due(instant, sensor->period)); ++i)
+        shift(s + sensor->readings, sensor->kept, sensor->width, y);
 }
 
-static double dot(const double *a, const double *b, int n)
+static void deliver(const sensor_type *sensor, double *s, double instant)
 {
-    double sum = a[0] * b[0];
-    for (int i = 1; i < n; ++i) sum = sum + a[i] * b[i];
-    return sum;
+    const double late = floor((instant - sensor->latency) / sensor->period);
+    const int reading = element(floor(instant / sensor->period) - late, sensor->kept);
+    const double *from = s + sensor->readings + (reading < 0 ? 0 : reading) * sensor->width;
+    if (sensor->latency) memcpy(s + sensor->delivered, from, (size_t)sensor->width * sizeof *s);
 }
 
-/* Add to each axis' command what cancels the torque of momenta that are swept round; gives the gimbals' commands. */
-static void compensate(
-    const rig_type *type, const axis_places *places, double *state, int at, decision *results, double *totals)
+int state_advance(double *s)
 {
-    const turning_type *turning = type->turning;
-    const int n = type->axes;
-    double turned[MOST_AXES], rates[MOST_AXES];
-    turning_places own;
-    (void)turning_place(turning, at, &own);
-    const double w = mems_gyro_read(&turning->gyro, &own.gyro, state, state[SEED], state[WORLD], state[own.rate]);
-    for (int i = 0; i < n; ++i) {
-        turned[i] = sin(results[i].y[1]);
-        rates[i] = results[i].rate;
+    const double instant = s[STEPS] / s[PER_INSTANT];
+    int is_good = 1;
+    for (int i = 0; instant == 0.0 && i < rig.streams; ++i)
+        noise_start(s + rig.noise + NOISE_WORDS * i, s[SEED], s[WORLD], rig.stream[i]);
+    for (int i = 0; i < rig.sensors; ++i) sample(&rig.sensor[i], s, instant);
+    if (!is_due(instant, rig.period)) return 1;
+    for (int i = 0; i < rig.sensors; ++i) deliver(&rig.sensor[i], s, instant);
+    (instant == 0.0 ? rig.first : instant < rig.settled ? rig.trimmed : rig.later)(s, s, s);
+    for (int i = 0; i < rig.axes; ++i) {
+        const axis_type *axis = &rig.axis[i];
+        const int estimate = axis->shown + SHOWN_ESTIMATE;
+        is_good = is_good && is_rate(i, s[rig.rate + i]) && are_finite(s, axis->shown, axis->shown + SHOWN_X_E) &&
+                  are_finite(s, estimate, estimate + axis->estimates);
     }
-    for (int i = 0; i < n; ++i) {
-        const double limit = type->axis[i]->controller->rate_limit, u = results[i].u;
-        const double added = w * (dot(turning->flywheels[i], turned, n) + dot(turning->inertia[i], rates, n)) /
-                             cos(results[i].y[1]);
-        const double wanted = u + added, total = wanted < -limit ? -limit : wanted > limit ? limit : wanted;
-        totals[i] = total;
-        results[i].u = wanted == total ? u : total - added; /* the law's, as far as it was not limited */
-        state[places[i].controller.u] = results[i].u;
-        state[places[i].coriolis] = w * dot(turning->coriolis[i], rates, n);
-    }
-}
-
-static void axis_show(const axis_type *axis, const axis_places *places, double *state, const decision *result)
-{
-    double *shown = state + places->shown;
-    memcpy(shown, result->y, SHOWN_U * sizeof *shown);
-    shown[SHOWN_U] = result->u;
-    shown[SHOWN_X_E] = result->x_e;
-    memcpy(shown + SHOWN_ESTIMATE, result->estimate, (size_t)axis->controller->estimates * sizeof *shown);
-}
-
-int state_advance(const rig_type *type, double *state)
-{
-    const double instant = state[STEPS] / state[PER_INSTANT];
-    const int is_decision = is_due(instant, type->period);
-    axis_places places[MOST_AXES];
-    decision results[MOST_AXES];
-    double totals[MOST_AXES];
-    int at = HEAD, is_good = 1;
-    for (int i = 0; i < type->axes; ++i) {
-        at = axis_place(type->axis[i], at, &places[i]);
-        axis_sample(type->axis[i], &places[i], state, instant);
-    }
-    if (!is_decision) return 1;
-    for (int i = 0; i < type->axes; ++i) {
-        is_good = axis_decide(type->axis[i], &places[i], state, instant, &results[i]) && is_good;
-        totals[i] = results[i].u;
-    }
-    if (type->turning) compensate(type, places, state, at, results, totals);
-    for (int i = 0; i < type->axes; ++i) {
-        const axis_type *axis = type->axis[i];
-        axis_show(axis, &places[i], state, &results[i]);
-        state[places[i].rate] = controller_gimbal_rate(axis->controller, &places[i].controller, state, totals[i]);
-        is_good = is_good && is_rate(axis, state[places[i].rate]);
-    }
-    return is_good;
+    return is_good && are_finite(s, rig.memory, rig.noise);
 }
