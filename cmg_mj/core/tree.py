@@ -28,8 +28,13 @@ class Leaf(NamedTuple):
     value: Any
 
 
-def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
+def numbers(tree: Any, path: tuple[str, ...] = (), worlds: tuple[type, ...] = ()) -> Iterator[Leaf]:
     """Yield all numbers of a state, a tree of containers, in order.
+
+    Args:
+        tree: The state.
+        path: Its own path.
+        worlds: Types that are numbers too, one a world, such as an array.
 
     Raises:
         InputError: The state holds other values, or goes too deep.
@@ -38,11 +43,11 @@ def numbers(tree: Any, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
         raise InputError(
             f"its state goes deeper than {MAX_DEPTH} parts within parts, or holds itself: use a tuple of numbers"
         )
-    parts = _parts(tree)
+    parts = None if isinstance(tree, worlds) else _parts(tree)
     if parts is not None:
         for name, part in parts:
-            yield from numbers(part, (*path, name))
-    elif isinstance(tree, NUMBERS):
+            yield from numbers(part, (*path, name), worlds)
+    elif isinstance(tree, (*NUMBERS, *worlds)):
         yield Leaf(path, tree)
     elif not isinstance(tree, CONSTANTS):
         where = f" ({'.'.join(path)})" if path else ""

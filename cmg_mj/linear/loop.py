@@ -1,76 +1,51 @@
-"""The closed loop as one linear system, sampled at the least time that holds whole periods of control and sensors."""
+"""The closed loop over a common period of control and sensors as one function, and its slopes at rest as matrices."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from operator import sub
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar, cos, sin
+from cmg_mj.core.axis import AxisControl, Deciding, KnownPlant, Sampled
 from cmg_mj.core.errors import InputError, nearest, shortened
-from cmg_mj.core.sensor import steps_until
-from cmg_mj.core.types import STATE_SIGNALS, extra_signals, reads_gyro
+from cmg_mj.core.reduced_model import ReducedModel
+from cmg_mj.core.rig import RigControl
+from cmg_mj.core.sensor import Digital, Sensor
+from cmg_mj.core.tilt import GimbalAngle, PairTilt
+from cmg_mj.core.types import STATE_SIGNALS, Forces, IdealReading, Measurement
 from cmg_mj.linear.plant import LinearPlant, linear_reduced, linearise_alone
-from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes
+from cmg_mj.linear.slopes import Slopes, law_slopes, needed_states, observer_slopes, slopes_at
+from cmg_mj.observers.linear import FiniteDifference
 from cmg_mj.plant.plant import Plant
 from cmg_mj.scenario.design import Design
-from cmg_mj.stages.low_pass import INSIDE_HZ, coefficients
-from cmg_mj.stages.notch import Notch
 
 if TYPE_CHECKING:
     import control
 
-INPUTS = (
-    "push_n_m",
-    "y1_noise_rad",
-    "acceleration_noise_rad_s2",
-    "y2_noise_rad",
-    "fog_noise_rad_s",
-    "gimbal_rate_noise_rad_s",
-)
+MEASURED = ("y1_noise_rad", "acceleration_noise_rad_s2", "y2_noise_rad", "fog_noise_rad_s")
+"""Noise of the measurements, in the order in which `ClosedLoop.sense` shows them."""
+INPUTS = ("push_n_m", *MEASURED, "gimbal_rate_noise_rad_s")
 """Inputs of the system: a torque on the rig, noise of four measurements, a gimbal rate that nobody commanded."""
 OUTPUTS = (*STATE_SIGNALS, "u_rad_s")
 """Outputs before those of the observer: true tilt, tilt rate and gimbal angle, and the command."""
 MODELS = ("rig", "reduced")
 """Plants of the system: the rig linearised as it is simulated, or the reduced model."""
-FORCES = ("inner", "inner_z", "outer", "outer_z")
-"""What the accelerometers show, across and along the radial line."""
 TAKES = (
     *("adaptive", "finite_difference", "free_pivot", "gyro_free", "high_gain"),
     *("kalman", "linear", "linear_high_gain", "ltv", "luenberger", "mems_fused"),
 )
 """The package's observers that have a slope at rest."""
-NO_SLOPES = Slopes((), *np.zeros((4, 0, 0)))
-
-
-class _Channel(NamedTuple):
-    """A measurement on its way to the controller, in physics steps.
-
-    Attributes:
-        name: The sensor.
-        period: Time between two readings.
-        latency: Time until a reading is delivered.
-        raw: Period of the samples that the part's low-pass takes; 0 without one.
-        older: Steps by which these samples precede those of the pair's inner part.
-    """
-
-    name: str
-    period: int
-    latency: int
-    raw: int = 0
-    older: int = 0
-
-    def taken(self, tick: int) -> int:
-        """Return the step at which the newest reading at a tick was taken."""
-        return (tick - self.latency) // self.period * self.period - self.older
-
-    def is_filtered_at(self, step: int) -> bool:
-        """Return whether the low-pass takes a sample at a step."""
-        return bool(self.raw) and (step + self.older) % self.raw == 0
+SENSORS = ("accelerometer", "encoder", "fog", "mems_gyro")
+"""Sections of the sensors, in the order in which an axis has them."""
+MOTION = 6
+"""The number of the plant's outputs."""
+LENGTH = 1e-5
+"""Length of a difference of the sensors: shorter ones drown in the rounding of gravity."""
 
 
 def linear_closed_loop(design: Design, plant: Plant, model: str = "rig") -> control.StateSpace:
@@ -121,208 +96,226 @@ def sensors_used(design: Design) -> list[str]:
 
 
 class ClosedLoop:
-    """The loop over a common period. Each signal is a row: its weights on all states, then on all inputs.
+    """A linear plant and the control of its axis, without noise, rounding and play.
 
     Args:
         design: The law and the observers.
         plant: The plant, linearised.
         true_state: Whether the law gets the plant's state, as late as the sensors are, in place of an observer's.
+        worlds: The number of worlds, on arrays (n_worlds,); None for one, on floats.
 
     Attributes:
+        interval: Physics steps between the instants at which anything may be due.
         ticks: The number of control periods in a common one.
         period: The common period [s].
-        states: Name of each state.
         inputs: Name of each input.
-
-    Raises:
-        InputError: Observer or law have no slope.
     """
 
-    def __init__(self, design: Design, plant: LinearPlant, *, true_state: bool = False) -> None:
-        self._design, self._plant, self._true_state = design, plant, true_state
-        law, controller, self._timestep = design.law, design.scenario.controller, design.rig.timestep
-        self._estimating, extra, field = NO_SLOPES, (), f"controller.kind = {controller.kind!r}"
-        try:
-            if not true_state:
-                observer, field = design.observer(), f"observer.kind = {design.scenario.observer.kind!r}"
-                self._estimating, extra = observer_slopes(observer), extra_signals(observer)
-                self._reads_gyro = reads_gyro(observer)
-                field = f"controller.kind = {controller.kind!r}"
-            self._deciding = law_slopes(design.fresh_law(), len(extra))
-        except InputError as error:
-            takes = f"linear_closed_loop takes state_feedback with {', '.join(TAKES)}, or one of your own"
-            raise InputError(f"{field}: {error}; {takes}") from error
-        self._estimates = [] if true_state else [f"estimated_{name}" for name in (*STATE_SIGNALS, *extra)]
-        self._channels = _channels(design, true_state)
-        control_steps = round(law.dt / self._timestep)  # whole, as the time grid has it
-        self._steps = math.lcm(control_steps, *(channel.period for channel in self._channels))
-        self._tick_steps = range(0, self._steps, control_steps)
-        self.ticks, self.period = len(self._tick_steps), self._steps * self._timestep
-        # The state of a reading on its way: sensor, step of a common period at which it is taken, periods ago.
-        self._late: dict[tuple[str, int, int], str] = {}
-        for channel in self._channels:
-            late = [
-                (channel.name, taken % self._steps, age)
-                for taken in sorted({channel.taken(tick) for tick in self._tick_steps if channel.taken(tick) < 0})
-                for age in range(1, -(taken // self._steps) + 1)
-            ]
-            self._late |= {reading: f"{channel.name}_{i}" for i, reading in enumerate(late, 1)}
-        self._notch = Notch(controller.notch_hz, law.dt, math.inf) if controller.notch_hz else None
-        self.states = [
-            *plant.names,
-            *(f"{channel.name}_filter_{i}" for channel in self._channels if channel.raw for i in (1, 2)),
-            *self._late.values(),
-            *_prefixed("observer", self._estimating),
-            *_prefixed("law", self._deciding),
-            *(["notch_1", "notch_2"] if self._notch else []),
-            "u_before",
-        ]
+    def __init__(
+        self, design: Design, plant: LinearPlant, *, true_state: bool = False, worlds: int | None = None
+    ) -> None:
+        self._design = design
+        self._plant = plant
+        self._true_state = true_state
+        axis = _control(design)
+        self._axis = _fed_the_true_state(axis, design.rig.reduced) if true_state else axis
+        rig = RigControl((self._axis,))
+        self.interval = rig.steps_per_sample
+        self._steps = range(0, rig.common_period, self.interval)
+        self._silence = {stream: _silence(width, worlds) for stream, width in rig.draws.items()}
+        self._is_array = worlds is not None
+        self.ticks = rig.common_period // axis.period
+        self.period = rig.common_period * axis.timestep
         self.inputs = [*INPUTS, *(f"{INPUTS[-1]}_{tick}" for tick in range(1, self.ticks))]
-        rows = np.eye(len(self.states) + len(self.inputs))
-        self._start = dict(zip((*self.states, *self.inputs), rows, strict=True))
-        self._y1_slopes = _measured_slopes(design)
-        bandwidth = design.scenario.sensors.accelerometer.bandwidth_hz
-        self._low_pass = coefficients(bandwidth, INSIDE_HZ) if bandwidth else [[0.0] * 3] * 2
+        self._hold = plant.hold(self.interval * axis.timestep)
+        self._averaged = design.scenario.sensors.accelerometer.averaged and not true_state
+        self._gravity = design.rig.gravity
+        self._tilt = design.rig.tilt if true_state else _true_tilt(design)
+        zero = 0.0 if worlds is None else np.zeros(worlds)
+        self._rest = self.start(*[zero] * MOTION)
+        self._still = self._shown(0, self._rest)
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str], list[str]]:
         """Compute A, B, C, D of the states that reach an output, and the names of these states and of the outputs.
 
-        With several ticks in a period their commands and gimbal rates are further signals.
+        They are the slopes of a common period at rest: each signal is a row, its slopes by all states and inputs.
+        States that no input reaches, such as those of 1/f noise, are left out too. With several ticks in a period
+        their commands and gimbal rates are further signals.
+
+        Raises:
+            InputError: Observer or law have no slope.
         """
-        start, plant = self._start, self._plant
-        rows = self._rows = dict(start)
-        x, turned, push = np.array([rows[name] for name in plant.names]), rows["u_before"], rows["push_n_m"]
-        taken = {
-            (channel.name, channel.taken(tick) % self._steps) for channel in self._channels for tick in self._tick_steps
-        }
-        instants = {*self._tick_steps, *(step for _, step in taken)}
-        instants |= {step for channel in self._channels for step in range(self._steps) if channel.is_filtered_at(step)}
-        hold = cache(lambda steps: plant.hold(steps * self._timestep))
-        latched: dict[tuple[str, int], np.ndarray] = {}
-        shown, commands = [], []
-        rate_noises = self.inputs[len(INPUTS) - 1 :]  # one a tick
-        for step, after in pairwise([*sorted(instants), self._steps]):
-            motion = plant.C @ x + plant.D @ np.array([turned, push])
-            ideal = self._ideal(motion)
-            for channel in self._channels:
-                value = ideal[channel.name]
-                if channel.is_filtered_at(step):
-                    value = self._second_order(f"{channel.name}_filter", self._low_pass, value)
-                if (channel.name, step) in taken:
-                    latched[channel.name, step] = value
-            if step in self._tick_steps:
-                readings = {}
-                for channel in self._channels:
-                    ago, at = divmod(channel.taken(step), self._steps)  # periods ago, at a step of theirs
-                    reading = channel.name, at
-                    readings[channel.name] = start[self._late[*reading, -ago]] if ago else latched[reading]
-                u, estimate = self._decide(motion, readings)
-                turned = u + rows[rate_noises[len(commands)]]
-                commands.append(u)
-                shown = shown or [*motion[:3], u, *estimate[: len(self._estimates)]]
-            F, G = hold(after - step)
-            x = F @ x + G @ np.array([turned, push])
-        rows |= dict(zip(plant.names, x, strict=True))
-        for (name, step, age), reading in self._late.items():
-            rows[reading] = latched[name, step] if age == 1 else start[self._late[name, step, age - 1]]
-        n = len(self.states)
-        ahead, out = np.array([rows[name] for name in self.states]), np.array([*shown, *commands[1:]])
-        outputs = [*OUTPUTS, *self._estimates, *(f"u_rad_s_{i}" for i in range(1, self.ticks))]
-        A, B, C, D = ahead[:, :n], ahead[:, n:], out[:, :n], out[:, n:]
-        kept = needed_states(A, C)
-        return A[kept][:, kept], B[kept], C[:, kept], D, np.array(self.states)[kept].tolist(), outputs
+        with np.errstate(all="ignore"):
+            decided = self._decided()
+            sensed = [
+                slopes_at(self._rest, partial(self.sense, step), MOTION, LENGTH, together=True) for step in self._steps
+            ]
+        sizes = [len(part.A) for part in (self._plant, sensed[0], decided)]
+        n = sum(sizes)
+        x, sampled, deciding, inputs = np.split(np.eye(n + len(self.inputs)), np.cumsum(sizes))
+        (push,), noise, beside = np.split(inputs, [1, 1 + len(MEASURED)])
+        rates = iter(beside)
+        turned = deciding[decided.paths.index(("held",))]
+        outputs: list[np.ndarray] = []
+        for part in sensed:
+            motion = self.motion(x, turned, push)
+            shown = part.C @ sampled + part.D @ motion
+            sampled = part.A @ sampled + part.B @ motion
+            if len(shown):
+                shown[: len(noise)] += noise
+                u, *estimate = decided.C @ deciding + decided.D @ shown
+                deciding = decided.A @ deciding + decided.B @ shown
+                turned = u + next(rates)
+                outputs += [u] if outputs else [*motion[:3], u, *estimate[: len(self._estimates)]]
+            x = self.moved(x, turned, push)
+        J = np.array([*x, *sampled, *deciding, *outputs])
+        A, B, C, D = J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:]
+        kept = needed_states(A, C) & needed_states(A.T, B.T)
+        sampling = ["_".join([SENSORS[int(number)], *path]) for number, *path in sensed[0].paths]
+        controlling = ["_".join(path).replace("observers_0", "observer") for path in decided.paths]
+        states = np.array([*self._plant.names, *sampling, *controlling], dtype=object)
+        commands = [f"u_rad_s_{i}" for i in range(1, self.ticks)]
+        names = [*OUTPUTS, *(f"estimated_{name}" for name in self._estimates), *commands]
+        return A[kept][:, kept], B[kept], C[:, kept], D, states[kept].tolist(), names
 
-    def _ideal(self, motion: np.ndarray) -> dict[str, np.ndarray]:
-        """Return what perfect sensors show of the plant's outputs, to first order: tangential forces, y2, the gyro."""
-        known, settings = self._design.rig, self._design.scenario.plant
-        x1, x2, x3, y1, acceleration, gyro = motion
-        true = replace(
-            known.tilt,
-            r_inner=known.tilt.r_inner + 1e-3 * settings.accelerometer_inner_misplaced_mm,
-            r_outer=known.tilt.r_outer + 1e-3 * settings.accelerometer_outer_misplaced_mm,
-        )
-        forces = true.forces(-known.gravity * y1, 0.0 * y1, acceleration)
-        return {"encoder": x3, "fog": gyro, "tilt": x1, "rate": x2, **dict(zip(FORCES, forces, strict=True))}
+    def start(self, *motion: Scalar) -> Sampled:
+        """Start the sensors at the plant's outputs."""
+        return self._axis.init(self._reading(*motion), self._silence)
 
-    def _second_order(self, name: str, coefficients: Sequence[Sequence[float]], value: np.ndarray) -> np.ndarray:
-        """Advance a filter of second order, whose states are a name's 1 and 2."""
-        ((b0, b1, b2), (_, a1, a2)), rows = coefficients, self._rows
-        passed = b0 * value + rows[f"{name}_1"]
-        rows[f"{name}_1"] = b1 * value - a1 * passed + rows[f"{name}_2"]
-        rows[f"{name}_2"] = b2 * value - a2 * passed
-        return passed
+    def sense(self, step: int, sampled: Sampled, *motion: Scalar) -> tuple[Sampled, list[Scalar]]:
+        """Take the samples that are due.
 
-    def _decide(self, motion: np.ndarray, readings: dict[str, np.ndarray]) -> tuple[np.ndarray, Any]:
-        """Return the command of a tick, and the estimate, as `Controller.decide` makes them."""
-        rows, settings = self._rows, self._design.scenario.controller
-        before, y2 = rows["u_before"], readings["encoder"] + rows["y2_noise_rad"]
-        if self._true_state:
-            measured = [readings["tilt"], y2, 0.0 * before, before]
-            estimate = [readings["tilt"], readings["rate"], y2]
-        else:
-            y1, acceleration = self._y1_slopes @ np.array([readings[name] for name in _forces(self._design)])
-            y1, acceleration = y1 + rows["y1_noise_rad"], acceleration + rows["acceleration_noise_rad_s2"]
-            measured = [y1, y2, acceleration, before]
-            shown = (
-                [(1.0 + self._design.scenario.sensors.mems_gyro.scale_error) * motion[5]] if self._reads_gyro else []
-            )
-            estimate = self._advance("observer", self._estimating, [*measured, *shown])
-        x1, x2, x3 = (measured[0], estimate[1], y2) if settings.angle_source == "measured" else estimate[:3]
-        if settings.feedback != "observer":
-            x2 = motion[1] if settings.feedback == "truth" else readings["fog"] + rows["fog_noise_rad_s"]
-        (u,) = self._advance("law", self._deciding, [*measured, x1, x2, x3, *estimate[3:]])
-        if self._notch is not None:
-            u = self._second_order("notch", (self._notch.numerator, self._notch.denominator), u)
-        rows["u_before"] = u
-        return u, estimate
+        Args:
+            step: Number of the physics step.
+            sampled: The memory of the sensors.
+            *motion: The plant's outputs.
 
-    def _advance(self, owner: str, slopes: Slopes, inputs: Sequence[Any]) -> np.ndarray:
-        """Advance the observer or the law by a sample; return its outputs."""
-        names, width = _prefixed(owner, slopes), len(self._rows["u_before"])
-        state = np.array([self._rows[name] for name in names]).reshape(-1, width)
-        self._rows |= dict(zip(names, slopes.A @ state + slopes.B @ np.array(inputs), strict=True))
-        return slopes.C @ state + slopes.D @ np.array(inputs)
+        Returns:
+            The next memory; and at a control tick y1, the acceleration, y2, the rates of both gyros and the true one:
+            what rest shows counts as zero.
+        """
+        axis = self._axis
+        ideal = self._reading(*motion)
+        sampled = axis.sample(sampled, step, ideal, self._silence)
+        if step % axis.period:
+            return sampled, []
+        return sampled, [*map(sub, self._shown(step, sampled), self._still), ideal.rate]
+
+    def decide(
+        self,
+        step: int,
+        deciding: Deciding | None,
+        y1: Scalar,
+        acceleration: Scalar,
+        y2: Scalar,
+        fog: Scalar,
+        gyro: Scalar,
+        rate: Scalar,
+    ) -> tuple[Deciding, list[Scalar]]:
+        """Decide on what `sense` shows, first without a memory; return the next one, the command and the estimate."""
+        y = Measurement(y1, y2, acceleration, gyro if self._axis.reads_gyro else None)
+        after, tick = self._axis.decide_on(deciding, step, y, fog, rate)
+        return after, [tick.u, *tick.estimates[0]]
+
+    def motion(self, x: np.ndarray, turned: Scalar, push: Scalar) -> np.ndarray:
+        """Return the plant's outputs at a state, while the gimbals are turned and the rig is pushed."""
+        return self._plant.C @ x + self._plant.D @ np.array([turned, push])
+
+    def moved(self, x: np.ndarray, turned: Scalar, push: Scalar) -> np.ndarray:
+        """Return the plant's state at the next instant."""
+        F, G = self._hold
+        return F @ x + G @ np.array([turned, push])
+
+    def _decided(self) -> Slopes:
+        """Find the slopes of `decide` at rest."""
+        axis, scenario = self._axis, self._design.scenario
+        field = f"observer.kind = {scenario.observer.kind!r}"
+        try:
+            observer = observer_slopes(axis.observer).rest
+            field = f"controller.kind = {scenario.controller.kind!r}"
+            law = law_slopes(axis.law, len(axis.extra_signals[0])).rest
+        except InputError as error:
+            takes = f"linear_closed_loop takes state_feedback with {', '.join(TAKES)}, or one of your own"
+            raise InputError(f"{field}: {error}; {takes}") from error
+        decide = partial(self.decide, axis.settled)
+        shown = len(self._still) + 1
+        begun, _ = decide(None, *[0.0] * shown)
+        rest = begun._replace(observers=(observer,), law=law)
+        return slopes_at(rest, decide, shown, together=axis.is_trusted)
+
+    @property
+    def _estimates(self) -> Sequence[str]:
+        return () if self._true_state else (*STATE_SIGNALS, *self._axis.extra_signals[0])
+
+    def _shown(self, step: int, sampled: Sampled) -> tuple[Scalar, ...]:
+        """Return y1, the angular acceleration, y2 and what both gyros show; 0 for one that nobody reads."""
+        delivered = self._axis.delivered(sampled, step)
+        y = self._axis.measure(delivered)
+        return y.y1, y.acceleration, y.y2, delivered.fog, y.gyro if self._axis.reads_gyro else 0.0 * y.y1
+
+    def _reading(
+        self, x1: Scalar, x2: Scalar, x3: Scalar, y1: Scalar, acceleration: Scalar, gyro: Scalar
+    ) -> IdealReading:
+        """Return what perfect sensors show of the plant's outputs."""
+        forces: Forces = self._tilt.forces(-self._gravity * sin(y1), self._gravity * cos(y1), acceleration)
+        if self._is_array:
+            forces = np.array(forces)
+        places = self._places(y1, gyro) if self._averaged else ()
+        return IdealReading(forces, [x3], gyro, x2, (), places)
+
+    def _places(self, tilt: Scalar, rate: Scalar) -> list[Scalar]:
+        """Return `IdealReading.motion` about a pivot at rest."""
+        shown = []
+        upright = np.exp(-1j * tilt)  # of a vector across + i up, turned with the tilt
+        for (r, across), angle in zip(self._tilt.places, self._tilt.angles, strict=True):
+            velocity = -1j * rate * (across + 1j * r) * upright
+            own = np.exp(1j * angle) * upright
+            shown += [part for vector in (velocity, own, 1j * own) for part in (vector.real, 0.0, vector.imag)]
+        return [*shown, self._gravity]
 
 
-def _prefixed(owner: str, slopes: Slopes) -> list[str]:
-    """Name the states of the observer or the law; one that is a single number has the owner's name."""
-    return [f"{owner}_{name}" if name else owner for name in slopes.names]
+def _control(design: Design) -> AxisControl:
+    """Make the control of an axis whose readings are not rounded.
 
-
-def _channels(design: Design, true_state: bool) -> list[_Channel]:
-    """Return the measurements in the loop, with the times of each."""
-    timestep, sensors, channels = design.rig.timestep, design.scenario.sensors, []
-    for name in sensors_used(design):
-        sensor = getattr(sensors, name)
-        times = round(1.0 / sensor.rate_hz / timestep), steps_until(sensor.latency_s, timestep)
-        if name != "accelerometer":
-            channels.append(_Channel(name, *times))
-        elif true_state:
-            channels += [_Channel(signal, *times) for signal in ("tilt", "rate")]
-        else:
-            raw = round(1.0 / INSIDE_HZ / timestep) if sensor.bandwidth_hz else 0
-            skew = round(sensor.skew_s / timestep)
-            channels += [_Channel(name, *times, raw, skew * name.startswith("outer")) for name in _forces(design)]
-    return channels
-
-
-def _forces(design: Design) -> tuple[str, ...]:
-    """Name the forces of first order: along the ray, gravity is a cosine."""
-    return FORCES[::2] if design.rig.tilt.is_radial else FORCES
-
-
-def _measured_slopes(design: Design) -> np.ndarray:
-    """Return y1 and the angular acceleration by `_forces`, (2, n).
-
-    Differences of the code that runs, constant errors of the parts among it.
+    A gyro that is not fed back is read at every tick: the common period does not depend on it.
     """
-    tilt, gravity = design.rig.tilt, design.rig.gravity
-    erring = design.scenario.sensors.accelerometer.constant_errors()
+    rig, sensors = design.rig, design.scenario.sensors
+    plant = KnownPlant(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
+    gyro = replace(sensors.mems_gyro, counts_per_deg_s=0.0)
+    axis = design.axis_control(plant, open_loop_observers=[], sensors=replace(sensors, mems_gyro=gyro))
+    pair, encoder, fog, *cheap = map(_unrounded, axis.at_work)
+    if axis.feedback != "fog":
+        fog = Sensor("gyro", (), axis.period)
+    return replace(axis, at_work=(pair, encoder, fog, *cheap))
 
-    def measured(change: np.ndarray) -> np.ndarray:
-        forces = erring((np.array(tilt.forces(0.0, gravity, 0.0)) + change).tolist())
-        return np.array([tilt(*forces), tilt.acceleration(*forces)])
 
-    h = 1e-5 * gravity
-    changes = h * np.eye(4)[[FORCES.index(name) for name in _forces(design)]]
-    return np.transpose([measured(change) - measured(-change) for change in changes]) / (2.0 * h)
+def _unrounded(sensor: Sensor) -> Sensor:
+    stages = [replace(stage, resolution=0.0) if isinstance(stage, Digital) else stage for stage in sensor.stages]
+    return replace(sensor, stages=tuple(stages))
+
+
+def _fed_the_true_state(axis: AxisControl, model: ReducedModel) -> AxisControl:
+    """Take perfect accelerometers, and for the observer's rate that of a perfect gyro with their times."""
+    pair, encoder, fog, *_ = axis.at_work
+    perfect = Sensor("accelerations", (), pair.period, pair.latency)
+    feedback = axis.feedback
+    if feedback == "observer":
+        feedback = "fog"
+        fog = replace(perfect, signal="gyro")
+    unused = FiniteDifference(axis.law.dt, model)
+    at_work = perfect, encoder, fog
+    return replace(axis, observers=(unused,), at_work=at_work, memories=(), feedback=feedback, angle_source="measured")
+
+
+def _true_tilt(design: Design) -> PairTilt:
+    """Return where the accelerometers are, whatever the controller takes for their places."""
+    settings, tilt = design.scenario.plant, design.rig.tilt
+    inner = tilt.r_inner + 1e-3 * settings.accelerometer_inner_misplaced_mm
+    outer = tilt.r_outer + 1e-3 * settings.accelerometer_outer_misplaced_mm
+    return replace(tilt, r_inner=inner, r_outer=outer)
+
+
+def _silence(width: int, worlds: int | None) -> Callable[[int], Any]:
+    """Return a table of noise that is zero."""
+    zeros = [0.0] * width if worlds is None else np.zeros((width, worlds))
+    return lambda sample: zeros

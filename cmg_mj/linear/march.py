@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from cmg_mj.core.axis import KnownPlant
-from cmg_mj.core.tilt import GimbalAngle
-from cmg_mj.core.types import IdealReading
+from cmg_mj.linear.loop import ClosedLoop
 from cmg_mj.linear.plant import LinearPlant
 from cmg_mj.scenario.design import Design
-from cmg_mj.sensors import Sensors
-from cmg_mj.sensors.accelerometer import Accelerometer
 
 STARTS_RAD_S = (0.01, 0.05)
 """Tilt rates from which the motion has to decay: observers that are not linear answer to sizes."""
@@ -47,9 +42,9 @@ MOTION_WORDS: dict[Motion, str] = {
 def march(design: Design, plant: LinearPlant) -> Motion:
     """March a scenario's controller in closed loop with a linear plant.
 
-    Observer, law, notch and rate limit are those of a run; the sensors keep their rates, latencies and low-pass, and
-    lose noise, resolution and mounting errors. The plant is marched exactly between samples, but for its torque, which
-    goes with the cosine of the gimbals' angle.
+    Sensors, observer, law, notch and rate limit are those of a run, without noise and rounding; what the sensors show
+    at rest counts as zero. The plant is marched exactly between samples, but for its torque, which goes with the cosine
+    of the gimbals' angle.
 
     It starts from small tilt rates, and once as the scenario does, with its strongest push.
 
@@ -60,40 +55,39 @@ def march(design: Design, plant: LinearPlant) -> Motion:
     Returns:
         The motion.
     """
-    scenario, rig = design.scenario, design.rig
+    scenario = design.scenario
     worlds = len(STARTS_RAD_S) + 1  # one for each small start, and the scenario's own as the last
-    known = KnownPlant(rig.tilt, GimbalAngle((1.0,), (0.0,)), rig.timestep)
-    controller = design.controller(
-        known, world_ids=range(worlds), sensors=_quiet(scenario.sensors), open_loop_observers={}
-    )
-    interval = controller.steps_per_sample * rig.timestep
-    F, G = plant.hold(interval)
+    loop = ClosedLoop(design, plant, worlds=worlds)
+    interval = loop.interval * design.rig.timestep
     tilt, rate = (row / (row @ row) for row in plant.C[:2])
     x = np.transpose([*np.outer(STARTS_RAD_S, rate), math.radians(scenario.plant.initial_tilt_deg) * tilt])
-    bias, torque = np.zeros((2, worlds))
+    bias, torque, u, y2 = np.zeros((4, worlds))
     bias[-1] = math.radians(scenario.plant.equilibrium_bias_deg)
     pushes = [(push.torque_n_m, push.duration_s) for push in scenario.push]
     torque[-1], push_s = max(pushes, key=lambda push: abs(push[0] * push[1]), default=(0.0, interval))
-    u, y2, fell = np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, bool)
+    sampled, deciding = (), None
+    fell = np.zeros(worlds, bool)
     fall_angle = math.radians(scenario.metrics.fall_angle_deg)
-    ticks = math.ceil(max(WINDOW_S, 4.0 * controller.law.dt) / interval)
-    step, sizes = 0, []
+    ticks = math.ceil(max(WINDOW_S, 4.0 * design.law.dt) / interval)
+    instant, sizes = 0, []
     with np.errstate(all="ignore"):
         for duration in (DURATION_S, LONG_DURATION_S):
-            while not fell.all() and step * rig.timestep < duration:
+            while not fell.all() and instant * interval < duration:
                 squares = np.zeros((2, worlds))
                 for _ in range(ticks):
-                    push = (PUSH_S <= step * rig.timestep < PUSH_S + push_s) * torque
-                    _, x2, _, y1, acceleration, gyro = plant.C @ x + np.outer(plant.D[:, 1], push)
-                    fell |= ~(np.abs(y1) < fall_angle)  # true where it is not a number
-                    squares += np.square([x2, y2])
-                    across, radial = -rig.gravity * np.sin(y1 - bias), rig.gravity * np.cos(y1 - bias)
-                    forces = np.array(rig.tilt.forces(across, radial, acceleration))
-                    if controller.update(step, IdealReading(forces, [y2], gyro, x2)):
-                        u = np.array(controller.gimbal_rate)
-                    x = np.where(fell, 0.0, F @ x + G @ np.array([u * np.cos(y2), push]))
+                    push = (PUSH_S <= instant * interval < PUSH_S + push_s) * torque
+                    motion = loop.motion(x, 0.0 * u, push)
+                    fell |= ~(np.abs(motion[3]) < fall_angle)  # true where it is not a number
+                    squares += np.square([motion[1], y2])
+                    motion[2] = y2
+                    motion[3] -= bias
+                    sampled = sampled or loop.start(*motion)
+                    sampled, shown = loop.sense(instant * loop.interval, sampled, *motion)
+                    if shown:
+                        deciding, (u, *_) = loop.decide(instant * loop.interval, deciding, *shown)
+                    x = np.where(fell, 0.0, loop.moved(x, u * np.cos(y2), push))
                     y2 = np.where(fell, 0.0, y2 + interval * u)
-                    step += controller.steps_per_sample
+                    instant += 1
                 sizes.append(np.sqrt(squares / ticks))
             motion, is_decided = _judge(np.array(sizes), fell)
             if is_decided:
@@ -117,15 +111,3 @@ def _judge(sizes: np.ndarray, fell: np.ndarray) -> tuple[Motion, bool]:
     if decays[:-1].all():
         return ("decays" if decays[-1] else "decays if small"), True
     return ("falls" if fell[:-1].any() else "swings"), bool(grown[:-1].any())
-
-
-def _quiet(sensors: Sensors) -> Sensors:
-    """Return the sensors with their rates, latencies, ranges and low-passes, and without errors."""
-    kept = ("rate_hz", "latency_s", "range_g", "skew_s", "bandwidth_hz")
-    times = {name: getattr(sensors.accelerometer, name) for name in kept}
-    pair = Accelerometer(**times, noise_density_ug_rthz=0.0, counts_per_g=0.0)
-    encoder = replace(sensors.encoder, counts_per_revolution=0.0)
-    fog = replace(sensors.fog, angle_random_walk_deg_rth=0.0, bias_deg_h=0.0)
-    silent = ("noise_density_deg_s_rthz", "bias_instability_deg_h", "scale_error", "bias_deg_s", "counts_per_deg_s")
-    gyro = replace(sensors.mems_gyro, reading="calibrated", **dict.fromkeys(silent, 0.0))
-    return replace(sensors, accelerometer=pair, encoder=encoder, fog=fog, mems_gyro=gyro)

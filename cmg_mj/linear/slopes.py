@@ -1,4 +1,4 @@
-"""Slopes of an observer's or a law's step at rest, taken by differences of the code that runs."""
+"""Slopes of a step at rest, taken by differences of the code that runs."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.errors import InputError, raised
+from cmg_mj.core.failures import is_trusted
 from cmg_mj.core.tree import FLOATS, Leaf, numbers, rebuild
-from cmg_mj.core.types import Law, Measurement, Observer, feedback_state, reads_gyro
+from cmg_mj.core.types import Law, Measurement, Observer, State, feedback_state, reads_gyro
 
 STEPS = {1e-8: 1e-3, 1e-7: 1e-2, 1e-3: 0.6}
 """Length of a difference -> the share of a row's largest slope by which the slopes to both sides may be off.
@@ -22,6 +24,8 @@ RESTED = 1e-9
 """A number rests that changes by less than this share in a sample."""
 GONE = 1e-15
 """Or by less than this share of the largest that it was: a trace of the start that fades for ever."""
+TINY = 1e-14
+"""A number that is not larger counts as zero: it may be the rounding of gravity."""
 REST = (0.0, 0.0, 0.0)
 """Measurement at rest: y1, y2, acceleration."""
 MAX_SAMPLES = 40_000
@@ -29,7 +33,7 @@ MAX_SAMPLES = 40_000
 LOOK_EVERY = 100
 """Samples between two looks at it."""
 
-Step = Callable[..., tuple[Any, Sequence[float]]]
+Step = Callable[..., tuple[Any, Sequence[Scalar]]]
 """A step as a function: state, *inputs -> next state, outputs."""
 
 
@@ -37,18 +41,23 @@ class Slopes(NamedTuple):
     """A step near rest: next state and outputs by state and inputs.
 
     Attributes:
-        names: Name of each number of the state, (n,).
+        rest: The state at rest; its numbers are the n.
         A: Next state by state, (n, n).
         B: Next state by inputs, (n, n_inputs).
         C: Outputs by state, (n_outputs, n).
         D: Outputs by inputs, (n_outputs, n_inputs).
     """
 
-    names: tuple[str, ...]
+    rest: State
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+
+    @property
+    def paths(self) -> list[tuple[str, ...]]:
+        """The path of each number of the state."""
+        return [leaf.path for leaf in _floats(self.rest)]
 
 
 def observer_slopes(observer: Observer) -> Slopes:
@@ -64,11 +73,11 @@ def observer_slopes(observer: Observer) -> Slopes:
         InputError: The observer does not come to rest, has no slope there, or fails.
     """
 
-    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *gyro: float) -> tuple[Any, Any]:
+    def step(state: State, y1: Scalar, y2: Scalar, acceleration: Scalar, u: Scalar, *gyro: Scalar) -> tuple[State, Any]:
         return observer.step(state, Measurement(y1, y2, acceleration, *gyro), u)
 
     gyro = (0.0,) if reads_gyro(observer) else ()
-    return _slopes(observer, step, 4 + len(gyro), Measurement(*REST, *gyro))
+    return _tested(observer, step, 4 + len(gyro), Measurement(*REST, *gyro))
 
 
 def law_slopes(law: Law, extra_signals: int) -> Slopes:
@@ -85,13 +94,32 @@ def law_slopes(law: Law, extra_signals: int) -> Slopes:
         InputError: The law does not come to rest, has no slope there, or fails.
     """
 
-    def step(state: Any, y1: float, y2: float, acceleration: float, u: float, *fed: float) -> tuple[Any, Any]:
+    def step(
+        state: State, y1: Scalar, y2: Scalar, acceleration: Scalar, u: Scalar, *fed: Scalar
+    ) -> tuple[State, Sequence[Scalar]]:
         x1, x2, x3, *extra = fed
         x = feedback_state(x1, x2, x3, tuple(extra))
         state, command = law.step(state, Measurement(y1, y2, acceleration), x, u)
         return state, (command,)
 
-    return _slopes(law, step, 7 + extra_signals, Measurement(*REST))
+    return _tested(law, step, 7 + extra_signals, Measurement(*REST))
+
+
+def slopes_at(rest: State, step: Step, inputs: int, share: float = min(STEPS), *, together: bool = False) -> Slopes:
+    """Find the slopes of a step at a state.
+
+    Args:
+        rest: The state.
+        step: The step.
+        inputs: The number of its inputs, which are 0.
+        share: Length of a difference.
+        together: Whether the step takes arrays. Then it is called once, and each difference is a world.
+
+    Returns:
+        The slopes: means of those to both sides.
+    """
+    up, down = _one_sided(rest, step, inputs, share, together)
+    return _blocks(rest, 0.5 * (up + down))
 
 
 def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -110,31 +138,35 @@ def needed_states(A: np.ndarray, C: np.ndarray) -> np.ndarray:
     return needed
 
 
-def _slopes(part: Observer | Law, step: Step, inputs: int, y: Measurement) -> Slopes:
-    """Find the slopes of a step at rest, from this measurement on, without the states that no output depends on."""
+def _tested(part: Observer | Law, step: Step, inputs: int, y: Measurement) -> Slopes:
+    """Find the slopes of a step at rest, from this measurement on, and refuse a step that has none."""
     with np.errstate(all="ignore"):
         try:
             rest = _rest(part.init(y), step, inputs)
-            names = ["_".join(filter(None, leaf.path)) for leaf in _floats(rest)]
-            sides = [(_one_sided(rest, step, inputs, share), share_off) for share, share_off in STEPS.items()]
+            sides = [_one_sided(rest, step, inputs, share, is_trusted(part)) for share in STEPS]
         except InputError:
             raise
         except Exception as error:  # whatever a user's code raises
             raise InputError(f"fails near rest: {raised(error)}") from error
-    n = len(names)
-    (up, down), _ = sides[0]
+    up, down = sides[0]
     J = 0.5 * (up + down)
-    kept = needed_states(J[:n, :n], J[n:, :n])
-    rows, columns = (np.concatenate([kept, np.ones(more, bool)]) for more in (len(J) - n, inputs))
-    J, n = J[rows][:, columns], int(kept.sum())
-    size = np.max(np.abs(J), axis=1, initial=0.0, keepdims=True)
-    for pair, share_off in sides:
-        if not all(np.all(np.abs(side[rows][:, columns] - J) <= share_off * size) for side in pair):
+    slopes = _blocks(rest, J)
+    kept = needed_states(slopes.A, slopes.C)
+    rows, columns = (np.concatenate([kept, np.ones(more - len(kept), bool)]) for more in J.shape)
+    needed = np.ix_(rows, columns)
+    size = np.max(np.abs(J[needed]), axis=1, initial=0.0, keepdims=True)
+    for pair, share_off in zip(sides, STEPS.values(), strict=True):
+        if not all(np.all(np.abs(side - J)[needed] <= share_off * size) for side in pair):
             raise InputError("has no slope at rest")
-    return Slopes(tuple(np.array(names, dtype=object)[kept]), J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:])
+    return slopes
 
 
-def _rest(state: Any, step: Step, inputs: int) -> Any:
+def _blocks(rest: State, J: np.ndarray) -> Slopes:
+    n = len(_floats(rest))
+    return Slopes(rest, J[:n, :n], J[:n, n:], J[n:, :n], J[n:, n:])
+
+
+def _rest(state: State, step: Step, inputs: int) -> State:
     """Advance with inputs of zero until nothing changes."""
     still = (0.0,) * inputs
     largest: np.ndarray | float = 0.0
@@ -142,7 +174,7 @@ def _rest(state: Any, step: Step, inputs: int) -> Any:
         before = state
         state, _ = step(state, *still)
         if k % LOOK_EVERY == 0:
-            earlier, now = (np.array([leaf.value for leaf in _floats(each)]) for each in (before, state))
+            earlier, now = (np.array(_values(each)) for each in (before, state))
             if now.shape != earlier.shape or not np.all(np.isfinite(now)):
                 break
             largest = np.maximum(largest, np.abs(earlier))
@@ -151,20 +183,31 @@ def _rest(state: Any, step: Step, inputs: int) -> Any:
     raise InputError("does not come to rest while nothing moves")
 
 
-def _one_sided(rest: Any, step: Step, inputs: int, share: float) -> tuple[np.ndarray, np.ndarray]:
+def _one_sided(rest: State, step: Step, inputs: int, share: Scalar, together: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return the slopes of next state and outputs to the upper and to the lower side, (n_rows, n_columns) each."""
-    at = np.array([*(leaf.value for leaf in _floats(rest)), *[0.0] * inputs])
+    at = np.array([*_values(rest), *[0.0] * inputs])
     n = len(at) - inputs
+    worlds = (np.ndarray,) if together else ()
 
-    def after(numbers: np.ndarray) -> np.ndarray:
-        values = numbers.tolist()
+    def after(values: Sequence[Any]) -> list[Any]:
         state, outputs = step(rebuild(rest, iter(values[:n]), FLOATS), *values[n:])
-        return np.array([*(leaf.value for leaf in _floats(state)), *(float(output) for output in outputs)])
+        return [*_values(state, worlds), *outputs]
 
-    middle, lengths = after(at), np.where(np.abs(at) > 1e-100, share * np.abs(at), share)
-    up, down = ([after(at + move) - middle for move in np.diag(length)] for length in (lengths, -lengths))
-    return np.transpose(up) / lengths, np.transpose(down) / -lengths
+    wanted = share * np.where(np.abs(at) > TINY, np.abs(at), 1.0)
+    lengths = (at + wanted) - at  # as they are rounded
+    moves = np.diag(lengths)
+    moved = at[:, None] + np.hstack([0.0 * moves[:, :1], moves, -moves])
+    if together:
+        ends = np.vstack([value + 0.0 * moved[0] for value in after([*moved])])
+    else:
+        ends = np.transpose([after(column) for column in moved.T.tolist()])
+    up, down = np.hsplit(ends[:, 1:] - ends[:, :1], 2)
+    return up / lengths, down / -lengths
 
 
-def _floats(state: Any) -> list[Leaf]:
-    return [leaf for leaf in numbers(state) if isinstance(leaf.value, FLOATS)]
+def _floats(state: State, worlds: tuple[type, ...] = ()) -> list[Leaf]:
+    return [leaf for leaf in numbers(state, worlds=worlds) if isinstance(leaf.value, (*FLOATS, *worlds))]
+
+
+def _values(state: State, worlds: tuple[type, ...] = ()) -> list[Any]:
+    return [leaf.value for leaf in _floats(state, worlds)]

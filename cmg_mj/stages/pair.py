@@ -107,7 +107,7 @@ class Averaged(SensorStage):
             a = [(now - then) / self.period_s for now, then in zip(v, before, strict=True)]
             a[2] = a[2] + signal[-1]
             forces += [dot(list(x), a), dot(list(z), a)]
-        return signal, np.array(forces) if isinstance(forces[0], np.ndarray) else forces
+        return signal, forces
 
 
 @dataclass(frozen=True)

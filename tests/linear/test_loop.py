@@ -16,11 +16,16 @@ import pytest
 from scipy.linalg import expm
 
 from cmg_mj import Experiment, InputError, Measurement, Scenario, load_scenario, mount, parse_scenario, prepare
+from cmg_mj.core.sensor import Memory, Sensor, SensorStage, Signal, Site
+from cmg_mj.core.straight_line import Tables
+from cmg_mj.core.types import IdealReading
 from cmg_mj.features.mounting.write import write_scenario
+from cmg_mj.inputs.files import folder
 from cmg_mj.linear.loop import INPUTS, TAKES
 from cmg_mj.linear.plant import linearise
 from cmg_mj.linear.slopes import observer_slopes
 from cmg_mj.observers import OBSERVERS
+from cmg_mj.sensors.accelerometer import Accelerometer
 from tests.command import ROOT
 from tests.features.mounting.push_robots import cart_pole
 
@@ -60,15 +65,16 @@ def sampled_model(of: Experiment) -> tuple[np.ndarray, np.ndarray]:
     return F, G
 
 
-def worst_difference(of: Experiment, signals: tuple[str, ...] = ("x1_rad", "x3_rad", "u_rad_s")) -> float:
-    """The largest difference between the run and the linear system, over the signal's largest value."""
-    trajectory, system = of.run().trajectory, of.linear_closed_loop()
+def worst_difference(of: Experiment, system: Any = None) -> float:
+    """The largest difference between the run and the linear system, its own or another, over the signal's largest."""
+    trajectory = of.run().trajectory
+    system = system or of.linear_closed_loop()
     inputs = np.zeros((len(INPUTS), len(trajectory)))
     inputs[0] = trajectory["push_n_m"]
     response = control.forced_response(system, inputs=inputs, timepts=np.arange(len(trajectory)) * DT)
     linear = dict(zip(system.output_labels, response.outputs, strict=True))
     kind = of.scenario.observer.kind
-    pairs = [(linear[name], trajectory[name]) for name in signals]
+    pairs = [(linear[name], trajectory[name]) for name in ("x1_rad", "x3_rad", "u_rad_s")]
     pairs.append((linear["estimated_x2_rad_s"], trajectory[f"estimate/{kind}/x2_rad_s"]))
     return max(float(np.max(np.abs(a - b)) / np.max(np.abs(b))) for a, b in pairs)
 
@@ -187,6 +193,93 @@ def assert_push_moves_both_alike(settings: dict[str, Any]) -> None:
     for i, name in enumerate(["x1_rad", "x2_rad_s", "x3_rad", "u_rad_s"]):
         moved = runs[0][name] - runs[1][name]
         assert np.max(np.abs(linear[i] - moved)) < 1e-2 * np.max(np.abs(moved)), name
+
+
+@dataclass(frozen=True)
+class _Sluggish(SensorStage):
+    """Shows a share of each step at once, and the rest sample by sample."""
+
+    share: float
+
+    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
+        return signal
+
+    def step(
+        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
+    ) -> tuple[Memory, Signal]:
+        shown = [before + self.share * (x - before) for before, x in zip(memory, signal, strict=True)]
+        return shown, shown
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_a_stage_that_the_loop_has_never_heard_of_is_in_it(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
+    """With the true rate the sluggish accelerometers make one more state: what they show of the tilt."""
+    at_work = Accelerometer.at_work
+
+    def sluggish(self: Accelerometer, site: Site) -> Sensor:
+        sensor = at_work(self, site)
+        return replace(sensor, stages=(*sensor.stages, _Sluggish(share)))
+
+    monkeypatch.setattr(Accelerometer, "at_work", sluggish)
+    of = experiment(controller__feedback="truth")
+    F, G = sampled_model(of)
+    k1, *others = of.law.gains
+    closed = np.zeros((5, 5))  # x1, x2, x3, x_e, and what was shown at the tick before
+    closed[4, [0, 4]] = share, 1.0 - share
+    closed[:4, :4] = F - G @ np.array([[0.0, *others]])
+    closed[:4] -= k1 * G * closed[4]
+    system = of.linear_closed_loop("reduced")
+    z = np.exp(1j * np.array([0.5, 8.0, 60.0]) * DT)
+    noise = -k1 * np.append(G[:, 0], 0.0)  # it comes after the sensors
+    for point, response in zip(z, system["x1_rad", "y1_noise_rad"](z), strict=True):
+        assert response == pytest.approx(np.linalg.solve(point * np.eye(5) - closed, noise)[0], rel=1e-6)
+    for pole in np.linalg.eigvals(closed):
+        assert np.min(np.abs(system.poles() - pole)) < 1e-7 or abs(pole) < 1e-12
+
+
+def test_a_process_that_nothing_drives_is_left_out() -> None:
+    plain = experiment("adaptive").linear_closed_loop()
+    noisy = experiment("adaptive", sensors__accelerometer__bias_instability_ug=500.0).linear_closed_loop()
+    assert noisy.state_labels == plain.state_labels
+    np.testing.assert_allclose(noisy.A, plain.A, atol=1e-12)
+
+
+def test_a_turned_accelerometer_shows_the_same_whatever_it_errs_by() -> None:
+    """Turned by 90 degrees, what shows the tilt is gravity's rounding at rest: no difference may be a share of that."""
+    errors = {"sensors__accelerometer__misalignment_deg": (-0.3, 0.25), "sensors__accelerometer__skew_s": 0.001}
+    straight, turned = (
+        experiment("linear_high_gain", plant__accelerometer_outer_angle_deg=angle, **errors).linear_closed_loop()
+        for angle in (0.0, 90.0)
+    )
+    z = np.exp(1j * np.array([0.5, 8.0, 60.0]) * DT)
+    for name in ("push_n_m", "y1_noise_rad"):
+        np.testing.assert_allclose(turned["u_rad_s", name](z), straight["u_rad_s", name](z), rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_means_of_the_accelerometers_are_those_of_a_run(tmp_path: Path) -> None:
+    for path in folder("models").glob("*.xml"):
+        shown = [
+            f'<frame{kind} name="accelerometer_{place}_{name}" objtype="site" objname="accelerometer_{place}"/>'
+            for place in ("inner", "outer")
+            for kind, name in (("linvel", "velocity"), ("xaxis", "x"), ("zaxis", "z"))
+        ]
+        text = path.read_text()
+        if path.name == "scissored_pair.xml":
+            text = text.replace("</sensor>", "".join(shown) + "</sensor>")
+        (tmp_path / path.name).write_text(text)
+    settings = {
+        "plant__model": str(tmp_path / "scissored_pair.xml"),
+        "plant__accelerometer_outer_angle_deg": 20.0,
+        "plant__accelerometer_inner_across_m": 0.05,
+        "sensors__accelerometer__latency_s": 0.005,
+    }
+    means, instants = (
+        experiment("gyro_free", 0.03, sensors__accelerometer__averaged=averaged, **settings)
+        for averaged in (True, False)
+    )
+    assert worst_difference(means) < 2e-3
+    assert worst_difference(means, instants.linear_closed_loop()) > 0.02
 
 
 BORDERS: list[tuple[str, str, Any, Any]] = [
@@ -358,9 +451,9 @@ class _Odd:
 
 def test_states_of_all_kinds_are_taken() -> None:
     slopes = observer_slopes(_Odd())
-    assert slopes.names == ("pair_slow", "pair_fast_0", "parts_a_0")
-    assert slopes.C[1] == pytest.approx([2.0, -1.0, 1.0])
-    assert slopes.B[:, [0, 1, 3]] == pytest.approx(np.eye(3))
+    assert ["_".join(path) for path in slopes.paths] == ["pair_slow", "pair_fast_0", "pair_fast_1", "parts_a_0"]
+    assert slopes.C[1] == pytest.approx([2.0, -1.0, 0.0, 1.0])
+    assert slopes.B[[0, 1, 3]][:, [0, 1, 3]] == pytest.approx(np.eye(3))
 
 
 class _Drifts(_Odd):
