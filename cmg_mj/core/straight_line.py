@@ -181,7 +181,7 @@ class _Recorder:
                 raise InputError(f"a table is looked up at {number}, which is no input")
             looked = key, number.text
             if looked not in self._draws:
-                width = len(channels(number))
+                width = len(channels(int(number)))
                 names = [self._name("n") for _ in range(width)]
                 table = self._constant(key)
                 self.lines.append(f"({', '.join(names)},) = tables[{table}]({number.text})")
