@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -108,6 +110,18 @@ TORQUE = "torque_n_m"
 def as_estimate(parts: Sequence[Scalar]) -> Sequence[Scalar]:
     """Give an estimate of x alone its parts' names; a longer one is a plain tuple."""
     return Estimate(*parts) if len(parts) == len(STATE_NAMES) else tuple(parts)
+
+
+@cache
+def estimate_class(extra: tuple[str, ...]) -> Any:
+    """Make the named tuple of x1, x2, x3 and extra signals."""
+    made: Any = namedtuple("Estimate", (*STATE_NAMES, *extra))
+    made.__reduce__ = lambda self: (_estimate, (extra, *self))  # pickle finds no class that is made while it runs
+    return made
+
+
+def _estimate(extra: tuple[str, ...], *parts: Scalar) -> Any:
+    return estimate_class(extra)(*parts)
 
 
 STATE_SIGNALS = ("x1_rad", "x2_rad_s", "x3_rad")

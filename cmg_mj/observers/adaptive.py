@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, cos, dot
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
-from cmg_mj.core.types import BIAS, TORQUE, Measurement, as_estimate
+from cmg_mj.core.types import BIAS, TORQUE, Measurement, estimate_class
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 
 SINUSOID = "disturbance_n_m"
@@ -184,7 +184,7 @@ class Adaptive:
         xm = tuple(map(add, xm, change))
         # A constant, and the second part of a sinusoid.
         signals = [xm[-1 if name == SINUSOID else 0] for name in self._unknowns]
-        return State(x1, x2, xm, T1, T2, y), as_estimate((x1, x2, y2, *signals))
+        return State(x1, x2, xm, T1, T2, y), estimate_class(self.extra_signals)(x1, x2, y2, *signals)
 
     def _acting(self, tilt: Scalar, inertia: Scalar) -> list[Scalar]:
         """Second row of B0 Cm, an entry a state of the exosystem; of a sinusoid its mean over the sample."""

@@ -14,7 +14,7 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.one_by_one import for_worlds
-from cmg_mj.core.types import State, as_estimate, extra_signals, needs
+from cmg_mj.core.types import State, estimate_class, extra_signals, needs
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
 from cmg_mj.observers import OBSERVER_CLASSES, Measurement, Observer
@@ -127,7 +127,7 @@ class BatchedObservers:
             observer_state, estimate = observer.step(observer_state, _measurement(y, worlds), held)
             states.append(observer_state)
             estimates.append([np.broadcast_to(part, held.shape) for part in estimate])
-        return states, as_estimate([np.concatenate(parts) for parts in zip(*estimates, strict=True)])
+        return states, estimate_class(self.extra_signals)(*map(np.concatenate, zip(*estimates, strict=True)))
 
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:
