@@ -174,6 +174,8 @@ def judge_gains(design: Design) -> GainsVerdict:
     try:
         with np.errstate(all="ignore"):
             loop = judge(ClosedLoop(design, linear_reduced(model), true_state=True), period + delay)
+    except InputError:
+        raise
     except (np.linalg.LinAlgError, ValueError, OverflowError) as error:
         raise InputError(
             f"plant.model = {shown(scenario.plant.model)}: its reduced model runs beyond all numbers within a sample "
