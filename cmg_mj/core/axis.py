@@ -251,26 +251,25 @@ class AxisControl:
         self, deciding: Deciding | None, step: int, y: Measurement, fog: Scalar, rate: Scalar
     ) -> tuple[Deciding, Tick]:
         """Take the decision of a control tick on a measurement: see `decide`."""
-        time = step * self.timestep
         if deciding is None:
-            deciding = self._begun(y, time)
+            deciding = self._begun(y, step)
             zero = 0.0 * y[0]
             observers = deciding.observers
             estimates = [as_estimate((y[0], zero, y[1], *[zero] * len(names))) for names in self.extra_signals]
         else:
-            observers, estimates = self._observed(deciding, y, time)
+            observers, estimates = self._observed(deciding, y, step)
         memory = deciding.law
         for remember in self.memories:
             memory = remember(step, estimates[0], memory)
         x = self._fed_back(y, estimates[0], fog, rate, deciding.known)
         x_e = getattr(memory, "x_e", None)
-        law, u = self._decided(memory, y, x, deciding.held, time)
+        law, u = self._decided(memory, y, x, deciding.held, step)
         commands, u = passed(self.commands, deciding.commands, u)
         x_e = math.nan * y[0] if x_e is None else x_e
         tick = _new(Tick, (y[0], y[1], y.acceleration, fog, u, x_e, estimates, y.gyro))
         return _new(Deciding, (observers, law, u, commands, deciding.servos, deciding.known)), tick
 
-    def _begun(self, y: Measurement, time: float) -> Deciding:
+    def _begun(self, y: Measurement, step: int) -> Deciding:
         """Return the memory before the first decision."""
         zero = 0.0 * y[0]
         observers = []
@@ -278,16 +277,16 @@ class AxisControl:
             try:
                 observers.append(observer.init(y))
             except Exception as error:
-                stop(observer, "observer", time, error)
+                stop(observer, "observer", step * self.timestep, error)
         try:
             law = self.law.init(y)
         except Exception as error:
-            stop(self.law, "law", time, error)
+            stop(self.law, "law", step * self.timestep, error)
         commands, servos = (tuple(stage.init(zero) for stage in stages) for stages in (self.commands, self.servos))
         return Deciding(tuple(observers), law, zero, commands, servos)
 
     def _observed(
-        self, deciding: Deciding, y: Measurement, time: float
+        self, deciding: Deciding, y: Measurement, step: int
     ) -> tuple[tuple[State, ...], list[Sequence[Scalar]]]:
         """Advance the observers by a sample."""
         after, estimates = [], []
@@ -301,10 +300,10 @@ class AxisControl:
                 if not self.is_trusted:
                     check_estimate(estimate, self._names(len(after) - 1), y)
         except Exception as error:
-            stop(observer, "observer", time, error)
+            stop(observer, "observer", step * self.timestep, error)
         # Many worlds are judged one by one, elsewhere. Neither NaN nor a masked number is below infinity.
         if type(y[0]) is float and not abs(sum(estimates[0])) < math.inf:
-            stop_not_finite(self.observers[0], estimates[0], self._names(0), time)
+            stop_not_finite(self.observers[0], estimates[0], self._names(0), step * self.timestep)
         return tuple(after), estimates
 
     def _names(self, observer: int) -> tuple[str, ...]:
@@ -323,7 +322,7 @@ class AxisControl:
         return feedback_state(x1, x2, x3, estimate[3:])
 
     def _decided(
-        self, memory: State, y: Measurement, x: FeedbackState, held: Scalar, time: float
+        self, memory: State, y: Measurement, x: FeedbackState, held: Scalar, step: int
     ) -> tuple[State, Scalar]:
         """Return the law's next memory and its command, within the limit."""
         try:
@@ -332,12 +331,12 @@ class AxisControl:
                 check_shape("u", command, y)
                 check_shape("x_e", getattr(memory, "x_e", y[0]), y)
         except Exception as error:
-            stop(self.law, "law", time, error)
+            stop(self.law, "law", step * self.timestep, error)
         limit = self.law.rate_limit
         if type(y[0]) is float:
             if not math.isfinite(command):
                 name = type(self.law).__name__
-                raise RunStopped(f"law {name} returned {command} for u at t = {time:g} s")
+                raise RunStopped(f"law {name} returned {command} for u at t = {step * self.timestep:g} s")
             return after, clip(float(command), -limit, limit)
         return after, where(abs(command) < math.inf, clip(command, -limit, limit), command)  # judged elsewhere
 

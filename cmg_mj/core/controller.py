@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.axis import AxisControl, Delivered, Sampled, Tick
-from cmg_mj.core.errors import InputError, RunStopped
 from cmg_mj.core.noise import Normals
 from cmg_mj.core.rig import AxesStage, Decision, Readings, RigControl, RigDeciding
 from cmg_mj.core.straight_line import Tables, straight_line
@@ -249,7 +248,7 @@ class Controller:
                 self._printed[phase] = straight_line(function, trees, tables, finite=finite)
             else:
                 self._printed[phase] = straight_line(function, trees, tables, len(self.world_ids))
-        except (InputError, RunStopped):  # no formula of floats alone, such as one with a branch on them
+        except Exception:  # no formula of numbers alone, such as one with a branch on them: the function says why
             self._print_from = math.inf
             return function
         return self._printed[phase]

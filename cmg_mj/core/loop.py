@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
+from operator import add
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -58,12 +60,18 @@ def acting(disturbances: Sequence[Disturbance], step: int, steps: int) -> Outsid
     if len(disturbances) == 1:
         return disturbances[0].at(step, steps)
     parts = [disturbance.at(step, steps) for disturbance in disturbances]
-    torques = [part.torques for part in parts if part.torques is not None]
-    acceleration = next((part.acceleration for part in parts if part.acceleration is not None), None)
+    torques, accelerations = (
+        [value for part in parts if (value := getattr(part, name)) is not None] for name in ("torques", "acceleration")
+    )
     setpoints = next((part.setpoints for part in parts if part.setpoints is not None), None)
-    if len(torques) > 1:
-        torques = [[sum(about) for about in zip(*torques, strict=True)]]
-    return Outside(torques[0] if torques else None, acceleration, setpoints)
+    return Outside(_added(torques), _added(accelerations), setpoints)
+
+
+def _added(vectors: Sequence[Sequence[Scalar]]) -> Sequence[Scalar] | None:
+    """Add vectors; None for none. A single one stays the same sequence."""
+    if len(vectors) < 2:
+        return vectors[0] if vectors else None
+    return [reduce(add, parts) for parts in zip(*vectors, strict=True)]
 
 
 def next_instant(step: int, grid: int, edges: Sequence[int]) -> int:

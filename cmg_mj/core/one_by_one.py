@@ -61,6 +61,8 @@ class OneByOne:
 
     def step(self, states: States, *inputs: Any) -> tuple[States, Any]:
         """Advance every world by a sample."""
+        if not self._copies:  # the states are those of a run before
+            self._copies = [copy.deepcopy(self.stands_for) for _ in states]
         after, results = States(states), [self._lost] * len(states)
         for world, part in enumerate(self._copies):
             given = [_of(value, world) for value in inputs]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cmg_mj.core.arrays import Scalar, clip, digitise
+from cmg_mj.core.arrays import Scalar, digitise
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import IdealReading
@@ -135,23 +135,6 @@ class Digital(SensorStage):
         if type(signal) is np.ndarray:
             return memory, digitise(signal, self.limit, self.resolution)
         return memory, list(map(digitise, signal, repeat(self.limit), repeat(self.resolution)))
-
-
-@dataclass(frozen=True)
-class Cut(SensorStage):
-    """A range without a resolution.
-
-    Attributes:
-        limit: Largest reading.
-    """
-
-    limit: float
-
-    def step(
-        self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables
-    ) -> tuple[Memory, Signal]:
-        """See `SensorStage`."""
-        return memory, [clip(x, -self.limit, self.limit) for x in signal]
 
 
 class SensorState(NamedTuple):

@@ -1,4 +1,4 @@
-"""Prints what a pure function did as straight-line Python: its operations alone, on floats, to the last bit.
+"""Prints what a pure function did as straight-line Python: its operations alone, to the last bit.
 
 A tick of one world is a chain of small functions, whose calls take longer than the arithmetic. Recorded once and
 printed, it takes half the time.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn, Self
 
 import numpy as np
 
@@ -78,18 +78,37 @@ Tables = Mapping[Any, Callable[[int], Sequence[Any]]]
 
 
 class Count(int):
-    """A whole number while a function is recorded: it is looked up with, and it is counted on."""
+    """A whole number while a function is recorded: it is looked up with, and it is counted on. Nothing else.
+
+    What is computed with it, or decided by its size, would be baked into the straight line.
+    """
 
     text: str
 
-    def __new__(cls, value: int, text: str) -> Count:
+    def __new__(cls, value: int, text: str) -> Self:
         """Make a count of an input's name."""
         count = super().__new__(cls, value)
         count.text = text
         return count
 
-    def __add__(self, more: int) -> Count:
-        return Count(int(self) + more, f"{self.text} + {more}")
+    def __add__(self, more: int) -> Self:
+        return type(self)(int(self) + int(more), f"{self.text} + {int(more)}")
+
+    __radd__ = __add__
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise InputError(f"the whole number {self.text} is computed with, or decides something")
+
+    __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _refuse
+    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __pow__ = __float__ = _refuse
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _refuse
+    __hash__ = int.__hash__
+
+
+class Phase(Count):
+    """The physics step: what is due at it comes again after a common period."""
+
+    __sub__, __mod__, __floordiv__ = int.__sub__, int.__mod__, int.__floordiv__
 
 
 class _Recorder:
@@ -123,10 +142,14 @@ class _Recorder:
         if type(tree) is int:
             name = self._name("i")
             return name, Count(tree, name)
-        if tree is not None and not isinstance(tree, (tuple, list)):
+        if tree is None:
+            name = self._name("v")
+            self.lines.append(f"if {name} is not None: raise ValueError")
+            return name, None
+        if type(tree) is not list and not isinstance(tree, tuple):
             raise InputError(f"{type(tree).__name__}: a straight line takes floats and whole numbers alone")
         if not tree:
-            return "_", tree
+            return "()", tree
         patterns, parts = zip(*map(self.given, tree), strict=True)
         pattern = f"({', '.join(patterns)},)"
         if type(tree) in (tuple, list):
@@ -143,6 +166,13 @@ class _Recorder:
             return whole, made
         return pattern, made
 
+    def argument(self, tree: Any) -> tuple[str, Any]:
+        """Return the same for a whole argument: a whole number is the physics step."""
+        if type(tree) is not int:
+            return self.given(tree)
+        name = self._name("i")
+        return name, Phase(tree, name)
+
     def table(self, key: Any, channels: Callable[[int], Sequence[Any]]) -> Callable[[int], Sequence[Any]]:
         """Return what looks up in a table while the function is recorded."""
 
@@ -151,7 +181,7 @@ class _Recorder:
                 raise InputError(f"a table is looked up at {number}, which is no input")
             looked = key, number.text
             if looked not in self._draws:
-                width = len(channels(number))
+                width = len(channels(int(number)))
                 names = [self._name("n") for _ in range(width)]
                 table = self._constant(key)
                 self.lines.append(f"({', '.join(names)},) = tables[{table}]({number.text})")
@@ -175,6 +205,8 @@ class _Recorder:
             return tree.text
         if type(tree) is float:
             return _literal(tree)
+        if type(tree) is int:
+            raise InputError(f"the whole number {tree} is computed, and not counted on")
         if not isinstance(tree, (tuple, list)):
             return self._constant(tree)
         parts = [self.printed(part, texts) for part in tree]
@@ -206,10 +238,10 @@ def straight_line(
     `ArithmeticError` or `ValueError` where the function on floats may do otherwise.
 
     Args:
-        function: Takes the trees and the tables. It has no branch on a float; what it does with whole numbers it does
-            at every call, but for looking up at them and counting on.
-        trees: Arguments to record it with: floats and whole numbers in tuples and lists; of many worlds arrays
-            (n_worlds,) or (channels, n_worlds) in the place of floats.
+        function: Takes the trees and the tables. It has no branch on a float.
+        trees: Arguments to record it with: floats, and whole numbers that are counted on, in tuples and lists; of many
+            worlds arrays (n_worlds,) or (channels, n_worlds) in the place of floats. A whole number by itself is the
+            physics step, whose remainders and quotients come again where the straight line is called.
         tables: Tables to record it with.
         worlds: Number of worlds, on arrays; None for one, on floats.
         finite: Selects the numbers of its result that must be finite: the straight line raises `ArithmeticError` where
@@ -222,7 +254,7 @@ def straight_line(
         InputError: The function cannot be recorded.
     """
     recorder = _Recorder(worlds)
-    patterns, arguments = zip(*map(recorder.given, trees), strict=True)
+    patterns, arguments = zip(*(recorder.argument(tree) for tree in trees), strict=True)
     result = function(*arguments, {key: recorder.table(key, table) for key, table in tables.items()})
     places = [symbol.place for symbol in _symbols(result)]
     texts, body = print_operations(recorder.tape, places, PYTHON if worlds is None else ON_ARRAYS, recorder.known)
@@ -244,8 +276,10 @@ def compiled(name: str, parameters: Sequence[str], lines: Sequence[str], known: 
 
 def _ordered(lines: Sequence[str]) -> list[str]:
     """Bring what unpacks a part behind what names it: an inner part's lines were written first."""
-    unpacking = [line for line in lines if "tables[" not in line]
-    return [*reversed(unpacking), *(line for line in lines if "tables[" in line)]
+    looked_up = [line for line in lines if "tables[" in line]
+    checks = [line for line in lines if line.startswith("if ")]
+    unpacking = [line for line in lines if line not in looked_up and line not in checks]
+    return [*reversed(unpacking), *checks, *looked_up]
 
 
 def _symbols(tree: Any) -> Iterable[Symbol]:

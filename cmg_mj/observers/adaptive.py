@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from collections.abc import Callable
 from functools import cached_property, reduce
 from itertools import repeat
@@ -16,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, cos, dot
 from cmg_mj.core.reduced_model import MARGIN, ReducedModel, is_hurwitz
-from cmg_mj.core.types import BIAS, TORQUE, Measurement
+from cmg_mj.core.types import BIAS, TORQUE, Measurement, as_estimate
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 
 SINUSOID = "disturbance_n_m"
@@ -146,11 +145,6 @@ class Adaptive:
         return [-self.Sigma * weight for weights in self._unknowns.values() for weight in weights]
 
     @cached_property
-    def _estimate(self) -> Any:
-        """A named tuple of x1, x2, x3 and the extra signals."""
-        return namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
-
-    @cached_property
     def _angle(self) -> tuple[float, float]:
         """Cosine and sine of the angle by which the exosystem turns in a sample."""
         angle = 2.0 * math.pi * self.sinusoid_hz * self.dt
@@ -190,7 +184,7 @@ class Adaptive:
         xm = tuple(map(add, xm, change))
         # A constant, and the second part of a sinusoid.
         signals = [xm[-1 if name == SINUSOID else 0] for name in self._unknowns]
-        return State(x1, x2, xm, T1, T2, y), self._estimate(x1, x2, y2, *signals)
+        return State(x1, x2, xm, T1, T2, y), as_estimate((x1, x2, y2, *signals))
 
     def _acting(self, tilt: Scalar, inertia: Scalar) -> list[Scalar]:
         """Second row of B0 Cm, an entry a state of the exosystem; of a sinusoid its mean over the sample."""

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, signed_powers, sqrt
 from cmg_mj.core.reduced_model import ReducedModel
-from cmg_mj.core.types import BIAS, Estimate, Measurement
+from cmg_mj.core.types import BIAS, STATE_NAMES, Estimate, Measurement
 from cmg_mj.inputs.types import STRICT, NonNegative, Positive
 from cmg_mj.observers.adaptive import Adaptive
 from cmg_mj.observers.adaptive import State as AdaptiveState
@@ -156,5 +156,6 @@ class HomogeneousAdaptive:
     def step(self, state: BothStates, y: Measurement, u: Scalar) -> tuple[BothStates, Any]:
         """Advance by one sample period: first the bias, then (11) with it."""
         adaptive, biased = self._adaptive.step(state.adaptive, y, u)
-        homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, biased.bias_rad)
-        return BothStates(adaptive, homogeneous), type(biased)(*estimate, biased.bias_rad)
+        bias = biased[len(STATE_NAMES)]
+        homogeneous, estimate = self._homogeneous.step(state.homogeneous, y, u, bias)
+        return BothStates(adaptive, homogeneous), (*estimate, bias)

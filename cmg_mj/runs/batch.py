@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
-from collections import namedtuple
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, TypeAlias, TypeVar
@@ -15,10 +14,10 @@ import numpy as np
 from cmg_mj.core.arrays import Scalar
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.one_by_one import for_worlds
-from cmg_mj.core.types import State, extra_signals, needs
+from cmg_mj.core.types import State, as_estimate, extra_signals, needs
 from cmg_mj.inputs.types import Batched, NoEffect, marked_fields
 from cmg_mj.laws import LAW_CLASSES, Law
-from cmg_mj.observers import OBSERVER_CLASSES, Estimate, Measurement, Observer
+from cmg_mj.observers import OBSERVER_CLASSES, Measurement, Observer
 from cmg_mj.plant.plant import Plant
 from cmg_mj.runs.disturbances import Outsides, outsides
 from cmg_mj.scenario.design import Design
@@ -113,7 +112,6 @@ class BatchedObservers:
     def __init__(self, parts: Sequence[tuple[Observer, int]]) -> None:
         self.extra_signals = extra_signals(parts[0][0])
         self.needs = needs(parts[0][0])
-        self._estimate: Any = namedtuple("Estimate", ("x1", "x2", "x3", *self.extra_signals))
         observers, worlds = zip(*parts, strict=True)
         self._parts = list(zip(map(for_worlds, observers), neighbours(worlds), strict=True))
 
@@ -121,7 +119,7 @@ class BatchedObservers:
         """Return each observer's state at the first sample."""
         return [observer.init(_measurement(y, worlds)) for observer, worlds in self._parts]
 
-    def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Estimate]:
+    def step(self, state: list[State], y: Measurement, u: Scalar) -> tuple[list[State], Any]:
         """Advance each by one sample period; estimates are arrays (n_worlds,)."""
         states, estimates = [], []
         for observer_state, (observer, worlds) in zip(state, self._parts, strict=True):
@@ -129,7 +127,7 @@ class BatchedObservers:
             observer_state, estimate = observer.step(observer_state, _measurement(y, worlds), held)
             states.append(observer_state)
             estimates.append([np.broadcast_to(part, held.shape) for part in estimate])
-        return states, self._estimate(*map(np.concatenate, zip(*estimates, strict=True)))
+        return states, as_estimate([np.concatenate(parts) for parts in zip(*estimates, strict=True)])
 
 
 def _measurement(y: Measurement, worlds: slice) -> Measurement:

@@ -128,7 +128,7 @@ class ControlCallback:
             if self._half_stages >= 2 and ahead < 1.25:  # RK4's fourth stage, before the next step's first
                 self._half_stages = 0
                 return False
-        if backwards:
+        if backwards and (self.controller.step or 0) >= round(t / h):  # else its state has been put back too
             self.controller.reset()
         self._half_stages = 0
         self._instant = t

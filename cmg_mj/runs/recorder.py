@@ -98,6 +98,7 @@ class TickRecorder:
             running: Which worlds have not ended, (n_worlds,); None for one world.
         """
         state = self._controller.state
+        assert state.decision is not None
         body_rate = ideals_of(state.readings)[self._number].gyro
         if not self._single:  # a row of all sensors' readings, which would be held as long
             body_rate = body_rate.copy()

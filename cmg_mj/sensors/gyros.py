@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from cmg_mj.core.arrays import Scalar, Symbolic, digitise, radians
 from cmg_mj.core.noise import CORNERS_HZ, FlickerNoise, NoiseStream, spread_of, wander_shares
-from cmg_mj.core.sensor import Cut, Memory, Sensor, SensorStage, Signal, Site, steps_until
+from cmg_mj.core.sensor import Digital, Memory, Sensor, SensorStage, Signal, Site, steps_until
 from cmg_mj.core.straight_line import Tables
 from cmg_mj.core.types import IdealReading
 from cmg_mj.inputs.types import STRICT, Batched, Latency, NonNegative, Positive, Rate
@@ -293,7 +293,7 @@ class Fog:
         stages = (
             Lag(self.step_share),
             White(NoiseStream.FOG.on_axis(site.axis), self.white_noise_sigma, (bias,)),
-            Cut(math.radians(self.range_deg_s)),
+            Digital(math.radians(self.range_deg_s)),
         )
         return Sensor(
             "gyro",
@@ -312,10 +312,6 @@ class Lag(SensorStage):
     """
 
     share: float
-
-    def init(self, signal: Signal, ideal: IdealReading, tables: Tables) -> Memory:
-        """Return what it shows."""
-        return ()
 
     def step(
         self, memory: Memory, signal: Signal, ideal: IdealReading, sample: int, tables: Tables

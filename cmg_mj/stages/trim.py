@@ -26,7 +26,7 @@ class Trim(NamedTuple):
 
     def __call__(self, step: int, estimate: Sequence[Scalar], memory: State) -> State:
         """Return the law's memory, trimmed."""
-        return memory._replace(x_e=self.gain * estimate[self.part]) if step < self.until else memory
+        return memory._replace(x_e=self.gain * estimate[self.part]) if int(step) < self.until else memory
 
 
 def trims(seconds: float, law: Law, extra_signals: Sequence[str], timestep: float) -> list[Trim]:

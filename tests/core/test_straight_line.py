@@ -123,7 +123,7 @@ def test_where_it_fails_the_plain_function_says_what_is(
     observer, steps, update = as_the_packages_own(part, monkeypatch), [], RigControl.update
 
     def watched(self: Any, sampled: Any, deciding: Any, step: int, *rest: Any) -> Any:
-        steps.append(step)
+        steps.append(int(step))
         return update(self, sampled, deciding, step, *rest)
 
     monkeypatch.setattr(RigControl, "update", watched)

@@ -15,6 +15,7 @@ from cmg_mj.core.axis import AxisControl
 from cmg_mj.core.errors import InputError
 from cmg_mj.core.rig import Decision, Readings, RigControl, RigDeciding, ideals_of
 from cmg_mj.core.sensor import Digital, Sensor, SensorState
+from cmg_mj.core.straight_line import Count, Phase
 from cmg_mj.core.tape import INPUT, Operand, Symbol, Tape
 from cmg_mj.core.tree import FLOATS, form, numbers, rebuild
 from cmg_mj.core.types import IdealReading
@@ -208,7 +209,7 @@ class Stream:
         Raises:
             InputError: It is neither the next one nor the last one of the same function.
         """
-        function = self._recorder.function
+        function, sample = self._recorder.function, int(sample)
         if sample == self._next:
             drawn = f"d{len(function.steps)}"
             words = f"s + {generator(self._number)}, {drawn}, {self._width}"
@@ -377,7 +378,7 @@ def _sensor(recorder: Recorder, axis: int, number: int, streams: Mapping[int, St
         after, reading = sensor.passed(before, x, ideal, sample, streams)
         return after, row("y[{}]", reading)
 
-    recorder.repeated(f"{name}_take", memory, [lambda before, n=n: taken(before, n) for n in (1, 2)])
+    recorder.repeated(f"{name}_take", memory, [lambda before, n=n: taken(before, Count(n, "sample")) for n in (1, 2)])
     delivered = [f"delivered {name} {i}" for i in range(len(reading))]
     return RecordedSensor(name, sensor, channels, [one for one, _ in remembered], delivered)
 
@@ -391,7 +392,7 @@ def _decisions(
         control, readings = recorder.rig()
         rows = [[(one, recorder.named(one.delivered)) for one in of_axis] for of_axis in sensors]
         sampled = [tuple(SensorState(1, (), (x,) * one.sensor.kept) for one, x in of_axis) for of_axis in rows]
-        step = tick * control.period
+        step = Phase(tick * control.period, "step")
         axes, ticks = control.decide(tuple(sampled), before, step, readings)
         after, decision = control.drive(axes, before and before.between, step, ticks, readings, streams)
         return after, _shown(decision)

@@ -252,7 +252,10 @@ class StudioSession:
         return ticked
 
     def _save(self, state: ControllerState) -> None:
-        if state.step is None:
+        """Keep a state to go back to. A user's observer or law may remember more than its state holds."""
+        if state.step is None or state is self._saved.get(state.step):
+            return
+        if not all(axis.is_trusted for axis in self.controller.axes):
             return
         self._saved.pop(state.step, None)
         if len(self._saved) >= SAVED:
