@@ -1,7 +1,7 @@
 """A sensor as a value: a chain of stages, sampled at its rate, delivered after its latency; times in physics steps.
 
 A stage is a value too: `init` makes its memory from the first signal, `step` advances it. A signal is a list of
-floats (one world) or an array (channels, n_worlds).
+floats (one world), a list of arrays (n_worlds,), or an array (channels, n_worlds).
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ class ClosedLoop:
         return IdealReading(forces, [x3], gyro, x2, (), places)
 
     def _places(self, tilt: Scalar, rate: Scalar) -> list[Scalar]:
-        """Return `IdealReading.motion` about a pivot at rest."""
+        """Return `IdealReading.motion` about a pivot at rest, in a world of across, aside and up."""
         shown = []
         upright = np.exp(-1j * tilt)  # of a vector across + i up, turned with the tilt
         for (r, across), angle in zip(self._tilt.places, self._tilt.angles, strict=True):

@@ -328,7 +328,9 @@ SIMULATED = (
 
 
 def omissions(scenario: Scenario) -> dict[str, str]:
-    """Find what the reduced model, margins, the ceiling and the floor of y1 with its acceleration know nothing of.
+    """Find what the reduced model, the loop of its true state, the ceiling and the floor of y1 know nothing of.
+
+    The whole loop, `ClosedLoop`, knows means and places of the accelerometers.
 
     Args:
         scenario: The scenario of one axis.

@@ -424,14 +424,14 @@ class Experiment:
     def linear_closed_loop(self, plant: Literal["rig", "reduced"] = "rig") -> control.StateSpace:
         """Make the closed loop, with the observer in it, a linear system for python-control.
 
-        The system is discrete at the control period. The plant is sampled exactly with the command held. Observer and
-        law are the scenario's own code, whose slopes at rest are taken by differences. The loop is linear about
-        upright at e = 0.
+        The system is discrete at the control period. The plant is sampled exactly with the command held. Sensors,
+        observer and law are the scenario's own code, whose slopes at rest are taken by differences. The loop is linear
+        about upright at e = 0.
 
-        - Covered: sample rates, latencies, skew, low-pass and constant errors of the sensors; notch, `feedback`,
-          `angle_source`, laws and observers of one's own.
-        - Left out: dry friction, range, resolution, the rate limit, `bias_trim_s`, and what an observer learns from
-          noise.
+        - Covered: sample rates, latencies, skew, low-pass, means and constant errors of the sensors, and where they
+          are; notch, `feedback`, `angle_source`, laws and observers of one's own.
+        - Left out: dry friction, range, resolution, noise, the rate limit, `bias_trim_s`, and what an observer learns
+          from noise. Means of accelerometers above a pivot that slides have its own acceleration at the instant.
         - Refused: observers without a slope at rest (`homogeneous`, `homogeneous_adaptive`, `super_twisting`),
           backlash, several axes, sensors slower than the controller, and with `rig` a robot that stands on contacts.
 
@@ -456,7 +456,8 @@ class Experiment:
                 a bend or a pivot that slides. `reduced`: the reduced model (6), whose gimbals turn as commanded.
 
         Returns:
-            A `control.StateSpace` with these names. States that no output depends on are left out.
+            A `control.StateSpace` with these names. States that no output depends on, or that no input reaches, are
+            left out.
 
         Raises:
             InputError: Something in the loop is not linear, or not covered; the message names it.
