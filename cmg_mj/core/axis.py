@@ -95,7 +95,7 @@ class KnownPlant(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What an axis knows of its next measurement, from a stage between the axes."""
+    """Knowledge of an axis' next measurement, from a stage between the axes."""
 
     tilt: Scalar = 0.0
     """Tilt by which the accelerometers err in a planned motion [rad]."""

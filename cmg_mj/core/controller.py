@@ -217,7 +217,7 @@ class Controller:
     def _decided(
         self, sampled: tuple[Sampled, ...], deciding: RigDeciding | None, step: int, readings: Readings
     ) -> tuple[tuple[Sampled, ...], RigDeciding, Decision]:
-        """Take samples and decisions: see `RigControl.update`. What decides elsewhere does so here."""
+        """Take samples and decisions: see `RigControl.update`."""
         arguments = sampled, deciding, step, readings, self._tables
         run = self._straight(self.rig.update, step, arguments, _shown)
         try:

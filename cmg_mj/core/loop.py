@@ -53,7 +53,7 @@ def acting(disturbances: Sequence[Disturbance], step: int, steps: int) -> Outsid
     """Put together what acts from a physics step on: see `Disturbance.at`.
 
     Args:
-        disturbances: What acts.
+        disturbances: The disturbances.
         step: Number of the physics step.
         steps: Physics steps until the next instant.
     """

@@ -23,14 +23,14 @@ Readings = IdealReading | MultiAxisReading
 
 
 class AxesOrders(NamedTuple):
-    """What has been ordered at a tick: of `told`, `rates` and `known` one an axis."""
+    """The orders of a tick: `told`, `rates` and `known` have one an axis."""
 
     told: Sequence[Scalar]
     """The commands that observers are told [rad/s]."""
     rates: Sequence[Scalar]
     """The commands of the servos [rad/s]."""
     known: Sequence[Known]
-    """What is known of the next measurements."""
+    """The knowledge of the next measurements, one an axis."""
     setpoints: Sequence[Scalar] = ()
     """Controls of the stages' `actuators`, one after the other."""
 
@@ -62,7 +62,7 @@ class AxesStage:
 
     @property
     def tables(self) -> Mapping[Any, Callable[[int], Sequence[float]]]:
-        """What it looks up by the physics step: key -> function."""
+        """Tables that it looks up by the physics step: key -> function."""
         return {}
 
     def sums(self, plant: Any, n_worlds: int) -> Sums | None:
@@ -168,7 +168,7 @@ class RigControl:
 
     @property
     def tables(self) -> dict[Any, Callable[[int], Sequence[float]]]:
-        """What the stages look up by the physics step."""
+        """The tables that the stages look up by the physics step."""
         return {key: table for stage in self.between for key, table in stage.tables.items()}
 
     def for_worlds(self) -> RigControl:

@@ -87,7 +87,7 @@ def in_python(controller: AxisControl, samples: np.ndarray) -> np.ndarray:
 CALLED = (*CALLS, "divide")
 """NumPy's functions that are called where a formula is computed, because Python's own raise."""
 OTHERWISE = {"divide": operator.truediv, **{name: getattr(np, name) for name in ("hypot", "floor", "ceil", "rint")}}
-"""Those of them that `math` rounds otherwise than math.h, or does not have."""
+"""Functions that `math` rounds otherwise than math.h, or does not have."""
 WORDS = {
     **PYTHON,
     **{name: f"{name}({{0}})" if getattr(np, name).nin == 1 else f"{name}({{0}}, {{1}})" for name in CALLED},

@@ -95,13 +95,13 @@ class _Recording(NamedTuple):
     """A part's init, and its step from a state of symbols.
 
     Attributes:
-        tape: What recorded them.
+        tape: The tape that recorded them.
         first: The measurement that init took.
         state: The state that it returned.
         leaves: The numbers in it.
         before: A symbol for each of them, which the step took.
         after: The numbers in the state that the step returned.
-        outputs: What it returned beside the state.
+        outputs: The results beside the state.
     """
 
     tape: Tape

@@ -78,7 +78,7 @@ class Lean:
 
         Args:
             memory: The memory.
-            ticks: Of each axis.
+            ticks: The decision of each axis.
             told: The command in force of each axis [rad/s].
             line: Components of the feet's line along the axes.
             both: 1 if both feet stand; then the robot tilts about that line alone.

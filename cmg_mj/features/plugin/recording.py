@@ -40,7 +40,7 @@ class Function(NamedTuple):
     """A function in C of the state's numbers `s`, of a signal `x`, to a signal `y`."""
 
     name: str
-    """What it has before the first `_` it has in common with the functions of the same part."""
+    """The name; before its first `_` it is the same for all functions of a part."""
     tape: Tape
     """Its operations."""
     steps: list[str | tuple[list[str], list[int]]]
@@ -67,7 +67,7 @@ class Recorder:
     Attributes:
         control: The control.
         function: The function that is recorded.
-        functions: Those that have been recorded, by name.
+        functions: The recorded functions, by name.
         given: Names of the numbers in sensordata and in qvel.
         places: Name of a number -> its place in the state.
     """
@@ -104,7 +104,7 @@ class Recorder:
         Args:
             name: The function's name.
             tree: The memory before.
-            runs: What it does at each time: (memory) -> (next memory, results).
+            runs: The function of each time: (memory) -> (next memory, results).
 
         Returns:
             The memory behind.
@@ -275,7 +275,7 @@ class RecordedRig(NamedTuple):
 
     recorder: Recorder
     sensors: list[RecordedSensor]
-    """Those that the decisions depend on."""
+    """The sensors on which the decisions depend."""
     memory: list[str]
     """Names of what the decisions remember."""
     inputs: list[str]
